@@ -1,0 +1,50 @@
+#include "harness/cases/kernel_case.h"
+
+#include "harness/error.h"
+
+namespace gnomon {
+
+void KernelCase::SetUp() {
+  try {
+    Session::current().subject(kernelName);
+  } catch (const Unsupported& why) {
+    Session::current().currentCase().unsupported = why.what();
+    GTEST_SKIP() << why.what();
+  }
+}
+
+Observation KernelCase::run(Stimulus stimulus) {
+  Session& session = Session::current();
+  stimulus.limit = session.limit();
+  Observation seen = observe(session.subject(kernelName), stimulus);
+  for (const std::string& finding : seen.findings) ADD_FAILURE() << finding;
+  return seen;
+}
+
+void KernelCase::expectConforms(const Observation& seen, const Expectation& expected) {
+  Session& session = Session::current();
+  const Subject& subject = session.subject(kernelName);
+  const Struct& layout = subject.record().buffer(expected.buffer).element;
+  Verdict verdict = judge(layout, seen, expected, session.bounds(), session.policy(), caseSeed());
+  checked(verdict.elements);
+  if (!verdict.ok() || verdict.outsideDevice > 0 || verdict.verdict != Class::kConforms)
+    ADD_FAILURE() << subject.origin() << " is " << nameOf(verdict.verdict) << "\n"
+                  << explain(verdict, expected);
+  session.currentCase().verdicts.push_back(std::move(verdict));
+}
+
+std::uint64_t caseSeed() {
+  const testing::TestInfo* info = testing::UnitTest::GetInstance()->current_test_info();
+  // FNV-1a, so that a case's inputs do not depend on the standard library's hash.
+  std::uint64_t hash = 14695981039346656037ull ^ Session::current().options().seed;
+  for (const char c : std::string(info->test_suite_name()) + "." + info->name())
+    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+std::size_t generated(const char* policyName) {
+  const Session& session = Session::current();
+  return session.options().cases.value_or(static_cast<std::size_t>(session.policy()[policyName]));
+}
+
+}  // namespace gnomon

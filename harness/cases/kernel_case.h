@@ -1,0 +1,87 @@
+// The fixture of every case that runs a kernel: upload, run, read, judge, each one line in a test.
+#pragma once
+
+#include <cstring>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "harness/cases/session.h"
+#include "harness/hygiene/observe.h"
+#include "harness/verdict/verdict.h"
+#include "reference/bound/explore.h"
+#include "reference/bound/vec.h"
+
+namespace gnomon {
+
+/// A suite for kernel "stage/entry" is a class StageEntry derived from this, so that the command
+/// knows whose case it is; model-only cases go into a suite StageEntryModel without the fixture.
+class KernelCase : public testing::Test {
+ protected:
+  explicit KernelCase(std::string kernel) : kernelName(std::move(kernel)) {}
+
+  /// Skips the case as unsupported where the device lacks what the kernel needs.
+  void SetUp() override;
+
+  /// Runs the kernel under every check of hygiene; what hygiene finds fails the case.
+  Observation run(Stimulus stimulus);
+
+  /// Judges one output and records the verdict. A kernel of the project must conform; a verdict of
+  /// wrong, or outside the device's measured errors, fails the case with an explanation.
+  void expectConforms(const Observation& seen, const Expectation& expected);
+
+  /// Elements that a law was checked on, for the tally.
+  void checked(std::size_t elements) { Session::current().currentCase().elements += elements; }
+
+  const std::string kernelName;
+};
+
+/// A seed of its own for every case, from the run's seed and the case's name.
+std::uint64_t caseSeed();
+
+/// How many elements a generated case has: --cases, or the policy's number of that name.
+std::size_t generated(const char* policyName);
+
+/// The elements of an output.
+template <class T>
+std::vector<T> elementsOf(const std::vector<std::byte>& bytes) {
+  std::vector<T> all(bytes.size() / sizeof(T));
+  if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
+  return all;
+}
+
+/// Calls f for every number of a model's result, in the order of its scalars().
+template <class T, class F>
+void forEachScalar(T& x, F& f) {
+  if constexpr (requires { x.scalars(); })
+    std::apply([&](auto&... members) { (forEachScalar(members, f), ...); }, x.scalars());
+  else
+    f(x);
+}
+
+/// An expectation from a model that is one function template over the number type:
+/// `model.template operator()<T>(i)` returns a struct whose scalars are those of the contract.
+template <class Model, class Describe>
+Expectation expectationOf(std::string buffer, std::size_t elements, Model model,
+                          Describe inputs) {
+  Expectation e;
+  e.buffer = std::move(buffer);
+  e.elements = elements;
+  e.plain = [model](std::size_t i, std::span<double> out) {
+    auto store = [at = out.begin()](double x) mutable { *at++ = x; };
+    auto result = model.template operator()<double>(i);
+    forEachScalar(result, store);
+  };
+  e.bounded = [model](std::size_t i, std::span<Bounded> out) {
+    auto store = [at = out.begin()](const Bounded& x) mutable { *at++ = x; };
+    auto result = explore([&] { return model.template operator()<Bounded>(i); });
+    forEachScalar(result, store);
+  };
+  e.inputs = inputs;
+  return e;
+}
+
+}  // namespace gnomon

@@ -1,0 +1,140 @@
+#include "harness/cases/runner.h"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include "harness/error.h"
+
+namespace gnomon {
+namespace {
+
+/// "lights/tile_cull" -> "LightsTileCull".
+std::string suiteName(const std::string& kernel) {
+  std::string suite;
+  bool upper = true;
+  for (const char c : kernel) {
+    if (c == '/' || c == '_') {
+      upper = true;
+    } else {
+      suite += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
+      upper = false;
+    }
+  }
+  return suite;
+}
+
+/// The kernel whose suite name is the longest prefix of this suite's.
+std::string kernelOf(std::string_view suite) {
+  std::string best, bestSuite;
+  for (const KernelRecord* record : catalogue()) {
+    const std::string name = suiteName(record->name());
+    if (suite.starts_with(name) && name.size() > bestSuite.size()) {
+      best = record->name();
+      bestSuite = name;
+    }
+  }
+  if (best.empty()) throw std::logic_error(fmt::format("suite '{}' names no kernel", suite));
+  return best;
+}
+
+void refuseUnknownStages(const std::vector<std::string>& wanted) {
+  std::set<std::string> known;
+  for (const KernelRecord* r : catalogue()) {
+    known.insert(r->stage);
+    known.insert(r->name());
+  }
+  for (const std::string& stage : wanted)
+    if (!known.contains(stage))
+      throw UsageError(
+          fmt::format("there is no stage '{}'.\nStages and kernels: {}", stage, fmt::join(known, ", ")));
+}
+
+bool belongs(const CaseName& c, const std::vector<std::string>& stages) {
+  return stages.empty() || std::ranges::any_of(stages, [&](const std::string& s) {
+           return c.kernel == s || c.kernel.starts_with(s + "/");
+         });
+}
+
+std::vector<CaseName> allCases() {
+  std::vector<CaseName> all;
+  const testing::UnitTest& tests = *testing::UnitTest::GetInstance();
+  for (const KernelRecord* record : catalogue())
+    for (int s = 0; s < tests.total_test_suite_count(); ++s) {
+      const testing::TestSuite& suite = *tests.GetTestSuite(s);
+      if (kernelOf(suite.name()) != record->name()) continue;
+      for (int t = 0; t < suite.total_test_count(); ++t)
+        all.push_back({fmt::format("{}.{}", suite.name(), suite.GetTestInfo(t)->name()),
+                       record->name()});
+    }
+  return all;
+}
+
+/// Carries GoogleTest's events into the session.
+class Listener : public testing::EmptyTestEventListener {
+ public:
+  Listener(Session& s, const std::vector<CaseName>& cases, const Observer& o)
+      : session(s), chosen(cases), observer(o) {}
+
+ private:
+  void OnTestStart(const testing::TestInfo& info) override {
+    const std::string name = fmt::format("{}.{}", info.test_suite_name(), info.name());
+    const auto found = std::ranges::find(chosen, name, &CaseName::name);
+    session.beginCase(found->name, found->kernel);
+    if (observer.begin) observer.begin(*found, started++, chosen.size());
+  }
+
+  void OnTestPartResult(const testing::TestPartResult& part) override {
+    CaseRecord& record = session.currentCase();
+    if (part.failed()) record.messages.push_back(part.message());
+    if (part.skipped() && !record.unsupported) record.skipped = part.message();
+  }
+
+  void OnTestEnd(const testing::TestInfo& info) override {
+    CaseRecord& record = session.currentCase();
+    record.failed = info.result()->Failed();
+    record.seconds = static_cast<double>(info.result()->elapsed_time()) / 1000;
+    if (observer.end) observer.end(record);
+  }
+
+  Session& session;
+  const std::vector<CaseName>& chosen;
+  const Observer& observer;
+  std::size_t started = 0;
+};
+
+}  // namespace
+
+std::vector<CaseName> selectCases(const Selection& selection) {
+  refuseUnknownStages(selection.stages);
+  std::vector<CaseName> chosen;
+  std::size_t position = 0;
+  for (CaseName& c : allCases()) {
+    if (!belongs(c, selection.stages)) continue;
+    if (!selection.filter.empty() && fnmatch(selection.filter.c_str(), c.name.c_str(), 0) != 0)
+      continue;
+    if (position++ % selection.shards + 1 == selection.shard) chosen.push_back(std::move(c));
+  }
+  if (position == 0)
+    throw UsageError(fmt::format("no case matches '{}'.\n`gnomon list cases` prints the names",
+                                 selection.filter));
+  return chosen;
+}
+
+void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer) {
+  std::vector<std::string> names;
+  for (const CaseName& c : cases) names.push_back(c.name);
+  testing::GTEST_FLAG(filter) = names.empty() ? "-*" : fmt::format("{}", fmt::join(names, ":"));
+  testing::TestEventListeners& listeners = testing::UnitTest::GetInstance()->listeners();
+  delete listeners.Release(listeners.default_result_printer());
+  listeners.Append(new Listener(session, cases, observer));
+  // The records say more than GoogleTest's own status.
+  [[maybe_unused]] const int status = RUN_ALL_TESTS();
+}
+
+}  // namespace gnomon

@@ -1,0 +1,85 @@
+#include "harness/cases/session.h"
+
+#include <stdexcept>
+
+#include "harness/error.h"
+#include "harness/program/compile.h"
+#include "harness/program/embedded.h"
+
+namespace gnomon {
+namespace {
+
+Session* theSession = nullptr;
+
+}  // namespace
+
+Session::Session(SessionOptions options)
+    : settings(std::move(options)), choices(Policy::load(settings.root / "tests/policy.json")) {
+  theSession = this;
+}
+
+Session& Session::current() {
+  if (theSession == nullptr) throw std::logic_error("a case runs outside a session");
+  return *theSession;
+}
+
+Gpu& Session::gpu() {
+  if (device && !device->alive()) {  // a case lost it: the next one starts afresh
+    subjects.clear();
+    device.reset();
+  }
+  if (!device)
+    device = std::make_unique<Gpu>(
+        Gpu::Options{.device = settings.device, .validation = settings.validation});
+  return *device;
+}
+
+const Subject& Session::subject(const std::string& kernel) {
+  Gpu& on = gpu();
+  std::unique_ptr<Subject>& slot = subjects[kernel];
+  if (!slot) {
+    const KernelRecord& record = findKernel(kernel);
+    const auto foreign = settings.kernels.find(kernel);
+    if (foreign == settings.kernels.end()) {
+      const auto words = embeddedSpirv(record.file);
+      slot = std::make_unique<Subject>(on, record, SpirvWords(words.begin(), words.end()),
+                                       "kernels/" + record.file);
+    } else {
+      slot = std::make_unique<Subject>(on, record, load(foreign->second, record),
+                                       foreign->second.string());
+    }
+  }
+  return *slot;
+}
+
+SpirvWords Session::load(const std::filesystem::path& file, const KernelRecord& record) const {
+  if (file.extension() == ".spv") {
+    SpirvWords module = readSpirv(file);
+    if (const std::string why = validateSpirv(module); !why.empty())
+      throw UsageError(file.string() + ": " + why);
+    return module;
+  }
+  const std::filesystem::path kernels = settings.root / "kernels";
+  return compileGlsl(file, {.includeFolders = {kernels / record.stage, kernels}});
+}
+
+const Bounds& Session::bounds() {
+  if (!rules) rules = Bounds::specification(gpu().info().roundingRteFloat32);
+  return *rules;
+}
+
+std::chrono::milliseconds Session::limit() const {
+  if (settings.timeout) return *settings.timeout;
+  return std::chrono::milliseconds(static_cast<long>(1000 * choices["caseSeconds"]));
+}
+
+void Session::beginCase(std::string name, std::string kernel) {
+  records.push_back({.name = std::move(name), .kernel = std::move(kernel)});
+}
+
+CaseRecord& Session::currentCase() {
+  if (records.empty()) throw std::logic_error("no case has begun");
+  return records.back();
+}
+
+}  // namespace gnomon

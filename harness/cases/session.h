@@ -1,0 +1,80 @@
+// One run of the command: the device, the kernels under test, and what every case has found so far.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/hygiene/subject.h"
+#include "harness/verdict/policy.h"
+#include "harness/verdict/verdict.h"
+
+namespace gnomon {
+
+struct SessionOptions {
+  std::filesystem::path root{};  ///< of the source tree: kernels/, tests/policy.json, data/
+  std::string device{};          ///< as Gpu::Options::device
+  std::uint64_t seed = 1;
+  std::optional<std::size_t> cases{};  ///< generated inputs a case, instead of the policy's number
+  std::optional<std::chrono::seconds> timeout{};  ///< a wait, instead of the policy's number
+  std::map<std::string, std::filesystem::path> kernels{};  ///< replaced: "stage/entry" -> file
+  bool validation = true;  ///< Vulkan's validation layer; off for timing only
+};
+
+/// What one case has found.
+struct CaseRecord {
+  std::string name{};    ///< "BrdfEvaluate.LobeStaysInsideTheBound"
+  std::string kernel{};  ///< "brdf/evaluate"
+  bool failed = false;
+  std::optional<std::string> skipped{};      ///< why
+  std::optional<std::string> unsupported{};  ///< what the device lacks
+  std::size_t elements = 0;                ///< checked, by a verdict or by a law
+  double seconds = 0;
+  std::vector<Verdict> verdicts{};
+  std::vector<std::string> messages{};  ///< one for each failure
+};
+
+class Session {
+ public:
+  explicit Session(SessionOptions options);
+
+  /// The session that cases run in. Programmer error if there is none.
+  static Session& current();
+
+  const SessionOptions& options() const { return settings; }
+  const Policy& policy() const { return choices; }
+
+  /// The device, opened at first use.
+  Gpu& gpu();
+
+  /// A kernel, ours or the one that replaces it, compiled and checked at first use. Throws
+  /// Unsupported, UsageError, DeviceError.
+  const Subject& subject(const std::string& kernel);
+
+  /// The rules of this device: what the specification allows, and what was measured if it was.
+  const Bounds& bounds();
+
+  /// Time limit of one wait for the device.
+  std::chrono::milliseconds limit() const;
+
+  void beginCase(std::string name, std::string kernel);
+  CaseRecord& currentCase();
+  const std::vector<CaseRecord>& cases() const { return records; }
+
+ private:
+  SpirvWords load(const std::filesystem::path& file, const KernelRecord& record) const;
+
+  SessionOptions settings;
+  Policy choices;
+  std::unique_ptr<Gpu> device;
+  std::optional<Bounds> rules;
+  std::map<std::string, std::unique_ptr<Subject>> subjects;
+  std::vector<CaseRecord> records;
+};
+
+}  // namespace gnomon

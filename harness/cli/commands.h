@@ -1,0 +1,57 @@
+// The commands. Each reads its options, does one thing and returns an exit status:
+// 0 all good; 1 something is wrong with a kernel, a frame or against a baseline; 2 usage or bad
+// input file; 3 no usable device.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/cases/runner.h"
+#include "harness/cases/session.h"
+
+namespace gnomon {
+
+inline constexpr int kGood = 0;
+inline constexpr int kWrong = 1;
+inline constexpr int kUsage = 2;
+inline constexpr int kNoDevice = 3;
+
+/// The source tree: $GNOMON_ROOT, else where the command was built from, else a folder above the
+/// command. Throws UsageError if none holds tests/policy.json.
+std::filesystem::path sourceRoot();
+
+struct DevicesOptions {
+  std::string json;  ///< file, "-" or empty
+};
+int devices(const DevicesOptions& options);
+
+struct ListOptions {
+  std::string what;  ///< stages, kernels or cases
+  std::vector<std::string> stages;
+  std::string json;
+};
+int list(const ListOptions& options);
+
+struct ValidateOptions {
+  SessionOptions session;
+  Selection selection;
+  std::string json;
+  std::filesystem::path out;    ///< folder for what each case found
+  std::filesystem::path junit;
+  bool require = false;         ///< unsupported and skipped cases are failures
+};
+int validate(const ValidateOptions& options);
+
+struct BenchOptions {
+  SessionOptions session;
+  std::vector<std::string> stages;
+  std::filesystem::path baseline;
+  std::string json;
+};
+int bench(const BenchOptions& options);
+
+/// Runs ctest in the folder that the command was built in.
+int test(const std::vector<std::string>& arguments);
+
+}  // namespace gnomon

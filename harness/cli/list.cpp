@@ -1,0 +1,57 @@
+#include <map>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "harness/cli/commands.h"
+#include "harness/program/kernel.h"
+#include "harness/report/summary.h"
+
+namespace gnomon {
+namespace {
+
+struct Line {
+  std::string name, note;
+};
+
+std::vector<Line> listStages(const std::vector<CaseName>& cases) {
+  std::vector<Line> lines;
+  for (const KernelRecord* r : catalogue()) {
+    if (std::ranges::none_of(cases, [&](const CaseName& c) { return c.kernel == r->name(); }))
+      continue;
+    if (lines.empty() || lines.back().name != r->stage) lines.push_back({r->stage, ""});
+    lines.back().note += (lines.back().note.empty() ? "" : ", ") + r->entry;
+  }
+  return lines;
+}
+
+std::vector<Line> listKernels(const std::vector<CaseName>& cases) {
+  std::vector<Line> lines;
+  for (const KernelRecord* r : catalogue())
+    if (std::ranges::any_of(cases, [&](const CaseName& c) { return c.kernel == r->name(); }))
+      lines.push_back({r->name(), r->summary});
+  return lines;
+}
+
+}  // namespace
+
+int list(const ListOptions& options) {
+  const std::vector<CaseName> cases = selectCases({.stages = options.stages, .filter = {}});
+  std::vector<Line> lines;
+  if (options.what == "stages") lines = listStages(cases);
+  if (options.what == "kernels") lines = listKernels(cases);
+  if (options.what == "cases")
+    for (const CaseName& c : cases) lines.push_back({c.name, ""});
+  if (options.json != "-")
+    for (const Line& l : lines)
+      fmt::print("{}\n", l.note.empty() ? l.name : fmt::format("{:<20} {}", l.name, l.note));
+  if (!options.json.empty()) {
+    auto array = nlohmann::json::array();
+    for (const Line& l : lines) array.push_back(l.name);
+    writeText(options.json,
+              nlohmann::json{{"schema", 1}, {options.what, array}}.dump(1) + "\n");
+  }
+  return kGood;
+}
+
+}  // namespace gnomon

@@ -1,0 +1,177 @@
+// The command line: every flag, its help, and the mapping of errors to exit statuses.
+#include <cstdio>
+#include <functional>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "harness/cli/commands.h"
+#include "harness/error.h"
+
+namespace {
+
+using namespace gnomon;
+
+constexpr const char* kExit =
+    "Exit status: 0 all good; 1 a kernel, a frame or a baseline is wrong; 2 usage or bad input "
+    "file; 3 no usable device.";
+
+/// "S/E=FILE", repeatable.
+void addKernelOption(CLI::App& command, SessionOptions& session) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--kernel",
+          [&session](const std::vector<std::string>& pairs) {
+            for (const std::string& pair : pairs) {
+              const std::size_t equals = pair.find('=');
+              if (equals == std::string::npos || equals == 0 || equals + 1 == pair.size())
+                throw UsageError(fmt::format("--kernel {}: give STAGE/ENTRY=FILE", pair));
+              session.kernels[pair.substr(0, equals)] = pair.substr(equals + 1);
+            }
+          },
+          "Judge FILE (GLSL or .spv) in place of the project's kernel")
+      ->type_name("STAGE/ENTRY=FILE")
+      ->take_all();
+}
+
+/// The flags of every command that runs kernels.
+void addSessionOptions(CLI::App& command, SessionOptions& session, std::string& json) {
+  command.add_option("--device", session.device,
+                     "Part of a device's name, or its index (default: a real GPU, else software)");
+  addKernelOption(command, session);
+  command.add_option("--seed", session.seed, "Seed of all generated input")->capture_default_str();
+  command
+      .add_option_function<unsigned>(
+          "--timeout", [&session](unsigned s) { session.timeout = std::chrono::seconds(s); },
+          "Seconds that one wait for the device may take (default: 60)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--json", json, "Write results as JSON to FILE, or - for standard output")
+      ->type_name("FILE");
+}
+
+void addShard(CLI::App& command, Selection& selection) {
+  command
+      .add_option_function<std::string>(
+          "--shard",
+          [&selection](const std::string& text) {
+            unsigned part = 0, parts = 0;
+            int used = 0;
+            if (std::sscanf(text.c_str(), "%u/%u%n", &part, &parts, &used) != 2 ||
+                static_cast<std::size_t>(used) != text.size() || part < 1 || part > parts)
+              throw UsageError(
+                  fmt::format("--shard {}: give I/N with 1 <= I <= N, such as 2/4", text));
+            selection.shard = part;
+            selection.shards = parts;
+          },
+          "Run the I-th of N parts")
+      ->type_name("I/N");
+}
+
+/// What the parsed command line will do.
+using Action = std::function<int()>;
+
+void addDevices(CLI::App& app, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("devices", "Vulkan devices, and which stages each cannot run and why");
+  auto options = std::make_shared<DevicesOptions>();
+  command->add_option("--json", options->json, "Write as JSON to FILE, or -")->type_name("FILE");
+  command->callback([&action, options] { action = [options] { return devices(*options); }; });
+}
+
+void addList(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("list", "Stages, kernels or cases");
+  auto options = std::make_shared<ListOptions>();
+  command->add_option("what", options->what, "stages, kernels or cases")
+      ->required()
+      ->check(CLI::IsMember({"stages", "kernels", "cases"}));
+  command->add_option("stages", options->stages, "STAGE or STAGE/ENTRY (default: all)");
+  command->add_option("--json", options->json, "Write as JSON to FILE, or -")->type_name("FILE");
+  command->callback([&action, options] { action = [options] { return list(*options); }; });
+}
+
+void addValidate(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "validate", "Judge every kernel, or those of the stages named, against its model");
+  auto o = std::make_shared<ValidateOptions>();
+  command->add_option("stages", o->selection.stages, "STAGE or STAGE/ENTRY (default: all)");
+  command
+      ->add_option_function<std::size_t>(
+          "--cases", [o](std::size_t n) { o->session.cases = n; },
+          "Generated inputs of each case (default: tests/policy.json)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--filter", o->selection.filter,
+                      "Only cases whose name (see `list cases`) matches the shell pattern")
+      ->type_name("GLOB");
+  command->add_option("--out", o->out, "Write what each case found into DIR")->type_name("DIR");
+  command->add_option("--junit", o->junit, "Write JUnit XML to FILE")->type_name("FILE");
+  addShard(*command, o->selection);
+  command->add_flag("--require", o->require, "Unsupported or skipped cases are failures");
+  addSessionOptions(*command, o->session, o->json);
+  command->footer(kExit);
+  command->callback([&action, o] { action = [o] { return validate(*o); }; });
+}
+
+void addBench(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("bench", "GPU time of kernels, and how it scales");
+  auto o = std::make_shared<BenchOptions>();
+  command->add_option("stages", o->stages, "STAGE (default: all)");
+  command
+      ->add_option("--baseline", o->baseline,
+                   "Compare with an earlier --json; exit 1 where slower than the policy allows")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE");
+  addSessionOptions(*command, o->session, o->json);
+  command->footer(kExit);
+  command->callback([&action, o] { action = [o] { return bench(*o); }; });
+}
+
+void addTest(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("test", "Every test of the project, through ctest");
+  auto arguments = std::make_shared<std::vector<std::string>>();
+  command->add_option("arguments", *arguments, "Passed to ctest, after --");
+  command->callback([&action, arguments] { action = [arguments] { return test(*arguments); }; });
+}
+
+int complain(const char* what, int status) {
+  fmt::print(stderr, "gnomon: {}\n", what);
+  return status;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Says whether a GPU rendering algorithm is right.", "gnomon");
+  app.set_version_flag("--version", GNOMON_VERSION);
+  app.require_subcommand(1);
+  app.footer(kExit);
+  Action action;
+  addDevices(app, action);
+  addList(app, action);
+  addValidate(app, action);
+  addBench(app, action);
+  addTest(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::CallForVersion& version) {
+    return app.exit(version);
+  } catch (const CLI::ParseError& error) {
+    return complain(fmt::format("{}\nSee `gnomon --help`.", error.what()).c_str(), kUsage);
+  }
+  return action();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest();
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    return complain(error.what(), kUsage);
+  } catch (const DeviceError& error) {
+    return complain(error.what(), kNoDevice);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kWrong);
+  }
+}

@@ -1,0 +1,33 @@
+// The kernel under test on one device: its module and its strict twin, ready to run.
+#pragma once
+
+#include <string>
+
+#include "harness/program/kernel.h"
+#include "harness/program/spirv.h"
+#include "harness/vulkan/gpu.h"
+
+namespace gnomon {
+
+/// Checked against the record before anything runs. Throws UsageError where the module's interface
+/// contradicts the record, Unsupported where the device lacks what the kernel needs.
+class Subject {
+ public:
+  /// `origin` names the module for messages: "kernels/brdf/evaluate.comp" or a user's file.
+  Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::string origin);
+
+  const KernelRecord& record() const { return *contract; }
+  const std::string& origin() const { return file; }
+  Gpu& gpu() const { return *device; }
+  const GpuProgram& plain() const { return plainProgram; }
+  const GpuProgram& twin() const { return twinProgram; }
+
+ private:
+  Gpu* device;
+  const KernelRecord* contract;
+  std::string file;
+  GpuProgram plainProgram;
+  GpuProgram twinProgram;
+};
+
+}  // namespace gnomon

@@ -1,0 +1,179 @@
+#include "harness/program/kernel.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "harness/error.h"
+
+namespace gnomon {
+namespace {
+
+std::vector<KernelRecord>& records() {
+  static std::vector<KernelRecord> all;
+  return all;
+}
+
+Field typed(const char* type, ScalarType scalar, unsigned scalars) {
+  return {.name = {}, .type = type, .scalar = scalar, .scalars = scalars};
+}
+
+// Members of a struct against those that the shader declares, position by position.
+void compareMembers(std::vector<std::string>& lines, const std::string& where, const Struct& ours,
+                    const std::vector<ReflectedMember>& theirs) {
+  for (const Field& f : ours.fields) {
+    const auto found = std::ranges::find(theirs, f.name, &ReflectedMember::path);
+    if (found == theirs.end()) {
+      lines.push_back(
+          fmt::format("{} has no member '{}' in the shader; the contract has {} {} at "
+                      "byte {}",
+                      where, f.name, f.type, f.name, f.offset));
+    } else if (found->type != f.type) {
+      lines.push_back(fmt::format("{}.{} is {} in the shader, {} in the contract", where, f.name,
+                                  found->type, f.type));
+    } else if (found->offset != f.offset) {
+      lines.push_back(fmt::format("{}.{} is at byte {} in the shader, {} in the contract", where,
+                                  f.name, found->offset, f.offset));
+    }
+  }
+  for (const ReflectedMember& m : theirs)
+    if (std::ranges::find(ours.fields, m.path, &Field::name) == ours.fields.end())
+      lines.push_back(fmt::format("{}.{} ({}) stands in the shader but not in the contract", where,
+                                  m.path, m.type));
+}
+
+void compareBuffer(std::vector<std::string>& lines, const BufferSpec& ours,
+                   const Reflection& reflection) {
+  const auto found = std::ranges::find(reflection.bindings, ours.name, &ReflectedBinding::name);
+  if (found == reflection.bindings.end()) {
+    lines.push_back(
+        fmt::format("the shader has no buffer '{}', which the contract binds at set 0, "
+                    "binding {}",
+                    ours.name, ours.binding));
+    return;
+  }
+  if (found->set != 0 || found->binding != ours.binding)
+    lines.push_back(
+        fmt::format("'{}' is at set {}, binding {} in the shader, set 0, binding {} in "
+                    "the contract",
+                    ours.name, found->set, found->binding, ours.binding));
+  if (found->stride != ours.element.size)
+    lines.push_back(
+        fmt::format("an element of '{}' takes {} bytes in the shader, {} in the "
+                    "contract",
+                    ours.name, found->stride, ours.element.size));
+  compareMembers(lines, ours.name, ours.element, found->members);
+}
+
+}  // namespace
+
+unsigned Struct::scalars() const {
+  unsigned n = 0;
+  for (const Field& f : fields) n += f.scalars;
+  return n;
+}
+
+const BufferSpec& KernelRecord::buffer(std::string_view called) const {
+  const auto found = std::ranges::find(buffers, called, &BufferSpec::name);
+  if (found == buffers.end())
+    throw std::logic_error(fmt::format("{} has no buffer '{}'", name(), called));
+  return *found;
+}
+
+std::function<std::array<std::uint32_t, 3>(std::size_t)> linearGrid(unsigned size) {
+  return [size](std::size_t items) {
+    const std::size_t groups = std::max<std::size_t>(1, (items + size - 1) / size);
+    return std::array<std::uint32_t, 3>{static_cast<std::uint32_t>(groups), 1, 1};
+  };
+}
+
+bool registerKernel(KernelRecord record) {
+  records().push_back(std::move(record));
+  return true;
+}
+
+std::vector<const KernelRecord*> catalogue() {
+  std::vector<const KernelRecord*> all;
+  for (const KernelRecord& r : records()) all.push_back(&r);
+  std::ranges::sort(
+      all, {}, [](const KernelRecord* r) { return std::make_tuple(r->order, r->stage, r->entry); });
+  return all;
+}
+
+const KernelRecord& findKernel(std::string_view name) {
+  std::vector<std::string> names;
+  for (const KernelRecord* r : catalogue()) {
+    if (r->name() == name) return *r;
+    names.push_back(r->name());
+  }
+  throw UsageError(
+      fmt::format("there is no kernel '{}'.\nKernels: {}", name, fmt::join(names, ", ")));
+}
+
+std::vector<std::string> contradictions(const KernelRecord& record, const Reflection& reflection) {
+  std::vector<std::string> lines;
+  for (const BufferSpec& b : record.buffers) compareBuffer(lines, b, reflection);
+  for (const ReflectedBinding& b : reflection.bindings)
+    if (std::ranges::find(record.buffers, b.name, &BufferSpec::name) == record.buffers.end())
+      lines.push_back(
+          fmt::format("the shader binds {} '{}' (set {}, binding {}), which the contract "
+                      "does not know",
+                      b.kind, b.name, b.set, b.binding));
+  if (reflection.pushBytes != record.push.size)
+    lines.push_back(fmt::format("push constants take {} bytes in the shader, {} in the contract",
+                                reflection.pushBytes, record.push.size));
+  return lines;
+}
+
+template <>
+Field typeOfMember<float>() {
+  return typed("float", ScalarType::kFloat, 1);
+}
+template <>
+Field typeOfMember<uint>() {
+  return typed("uint", ScalarType::kUint, 1);
+}
+template <>
+Field typeOfMember<int>() {
+  return typed("int", ScalarType::kInt, 1);
+}
+template <>
+Field typeOfMember<vec2>() {
+  return typed("vec2", ScalarType::kFloat, 2);
+}
+template <>
+Field typeOfMember<vec3>() {
+  return typed("vec3", ScalarType::kFloat, 3);
+}
+template <>
+Field typeOfMember<vec4>() {
+  return typed("vec4", ScalarType::kFloat, 4);
+}
+template <>
+Field typeOfMember<uvec2>() {
+  return typed("uvec2", ScalarType::kUint, 2);
+}
+template <>
+Field typeOfMember<uvec3>() {
+  return typed("uvec3", ScalarType::kUint, 3);
+}
+template <>
+Field typeOfMember<uvec4>() {
+  return typed("uvec4", ScalarType::kUint, 4);
+}
+template <>
+Field typeOfMember<ivec2>() {
+  return typed("ivec2", ScalarType::kInt, 2);
+}
+template <>
+Field typeOfMember<mat3>() {
+  return typed("mat3", ScalarType::kFloat, 9);
+}
+template <>
+Field typeOfMember<mat4>() {
+  return typed("mat4", ScalarType::kFloat, 16);
+}
+
+}  // namespace gnomon

@@ -1,0 +1,145 @@
+// The host-side record of a kernel: the one place from which tests, bench, mutate, watch and frame
+// learn its files, bindings, grid and needs. kernels/<stage>/<stage>.cpp registers them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "harness/program/reflect.h"
+#include "kernels/contract.h"
+
+namespace gnomon {
+
+enum class ScalarType { kFloat, kUint, kInt };
+
+/// A member of a contract struct as the C++ compiler lays it out.
+struct Field {
+  std::string name{};
+  std::string type{};  ///< GLSL spelling: "vec3"
+  ScalarType scalar = ScalarType::kFloat;
+  unsigned offset = 0;      ///< bytes
+  unsigned scalars = 0;     ///< number of 32-bit scalars
+  bool signOfZero = false;  ///< the contract fixes the sign of a zero
+};
+
+/// A contract struct, described once so that reflection can be held against it.
+struct Struct {
+  std::string name{};
+  unsigned size = 0;  ///< bytes
+  std::vector<Field> fields{};
+
+  /// Number of 32-bit scalars of all fields.
+  unsigned scalars() const;
+};
+
+/// Describes a struct from its member pointers: describe<Shaded>("Shaded", field("D", &Shaded::D)).
+template <class S, class M>
+struct FieldOf {
+  std::string name{};
+  M S::*member;
+  bool signOfZero = false;
+};
+
+template <class S, class M>
+FieldOf<S, M> field(std::string name, M S::*member) {
+  return {std::move(name), member};
+}
+
+/// The GLSL spelling and scalar type of a member: float, uint, int, vectors and matrices of them.
+template <class M>
+Field typeOfMember();
+
+template <class S, class... M>
+Struct describe(std::string name, FieldOf<S, M>... members) {
+  Struct result{std::move(name), sizeof(S), {}};
+  const S object{};
+  auto add = [&](const auto& m) {
+    Field f = typeOfMember<std::remove_cvref_t<decltype(object.*m.member)>>();
+    f.name = m.name;
+    f.signOfZero = m.signOfZero;
+    f.offset = static_cast<unsigned>(reinterpret_cast<const std::byte*>(&(object.*m.member)) -
+                                     reinterpret_cast<const std::byte*>(&object));
+    result.fields.push_back(std::move(f));
+  };
+  (add(members), ...);
+  return result;
+}
+
+enum class Access { kRead, kWrite };
+
+/// A storage buffer whose elements are one contract struct.
+struct BufferSpec {
+  std::string name{};  ///< the GLSL variable
+  unsigned binding = 0;
+  Access access = Access::kRead;
+  Struct element;
+};
+
+/// One entry of a stage: everything a run of it needs to know.
+struct KernelRecord {
+  int order = 0;      ///< of the stage, as a frame runs them (README's stage table)
+  std::string stage{};  ///< "brdf"
+  std::string entry{};  ///< "evaluate"
+  std::string file{};   ///< under kernels/
+  std::vector<BufferSpec> buffers{};
+  Struct push;
+  /// Groups for a number of items.
+  std::function<std::array<std::uint32_t, 3>(std::size_t items)> grid;
+  std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
+  bool deterministic = true;          ///< two runs on the same input agree to the bit
+  std::string summary{};                ///< one line for `gnomon list kernels`
+
+  std::string name() const { return stage + "/" + entry; }
+  const BufferSpec& buffer(std::string_view called) const;
+};
+
+/// Groups of `size` threads in x that cover the items; at least one, so that an empty input still
+/// runs the kernel's guard.
+std::function<std::array<std::uint32_t, 3>(std::size_t)> linearGrid(unsigned size);
+
+/// Adds a record to the catalogue; at namespace scope in kernels/<stage>/<stage>.cpp.
+bool registerKernel(KernelRecord record);
+
+/// All records, sorted by stage order, then by entry.
+std::vector<const KernelRecord*> catalogue();
+
+/// The record called "stage/entry"; throws UsageError that lists what there is.
+const KernelRecord& findKernel(std::string_view name);
+
+/// Where a module's interface contradicts the record, one line each with both sides named
+/// ("results.F is at byte 16 in the shader, 8 in the contract"); empty if they agree.
+std::vector<std::string> contradictions(const KernelRecord& record, const Reflection& reflection);
+
+template <>
+Field typeOfMember<float>();
+template <>
+Field typeOfMember<uint>();
+template <>
+Field typeOfMember<int>();
+template <>
+Field typeOfMember<vec2>();
+template <>
+Field typeOfMember<vec3>();
+template <>
+Field typeOfMember<vec4>();
+template <>
+Field typeOfMember<uvec2>();
+template <>
+Field typeOfMember<uvec3>();
+template <>
+Field typeOfMember<uvec4>();
+template <>
+Field typeOfMember<ivec2>();
+template <>
+Field typeOfMember<mat3>();
+template <>
+Field typeOfMember<mat4>();
+
+}  // namespace gnomon

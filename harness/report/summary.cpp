@@ -1,0 +1,212 @@
+#include "harness/report/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "harness/error.h"
+
+namespace gnomon {
+namespace {
+
+void add(KernelSummary& sum, const CaseRecord& record) {
+  sum.records.push_back(&record);
+  sum.cases += 1;
+  sum.failed += record.failed;
+  sum.skipped += record.skipped || record.unsupported;
+  sum.elements += record.elements;
+  sum.seconds += record.seconds;
+  if (record.unsupported) sum.unsupported = record.unsupported;
+  for (const Verdict& v : record.verdicts) {
+    sum.outside += v.outside;
+    sum.ambiguous += v.ambiguous;
+    sum.reassociated += v.reassociated;
+    sum.verdict = std::max(sum.verdict, v.verdict);
+    sum.widening = std::max(sum.widening, v.widening);
+    sum.maxBudget = std::max(sum.maxBudget.value_or(0), v.maxBudget());
+  }
+  if (record.failed) sum.verdict = Class::kWrong;
+}
+
+std::string className(const KernelSummary& k) {
+  if (k.unsupported) return "unsupported";
+  if (k.verdict == Class::kEquivalent) return fmt::format("equivalent (k = {})", k.widening);
+  return std::string(nameOf(k.verdict));
+}
+
+Colour colourOf(const KernelSummary& k) {
+  if (k.unsupported || k.verdict == Class::kEquivalent) return Colour::kYellow;
+  return k.verdict == Class::kConforms ? Colour::kGreen : Colour::kRed;
+}
+
+/// JSON has no infinity: a budget beyond all bounds is 1e300, which stays a number for scripts.
+nlohmann::json finite(const std::optional<double>& x) {
+  if (!x) return nullptr;
+  return std::isfinite(*x) ? *x : 1e300;
+}
+
+nlohmann::json domainsOf(const KernelSummary& k) {
+  auto list = nlohmann::json::array();
+  for (const CaseRecord* r : k.records)
+    for (const Verdict& v : r->verdicts)
+      for (const FieldVerdict& f : v.fields)
+        list.push_back({{"case", r->name},
+                        {"field", f.name},
+                        {"elements", v.elements},
+                        {"judgedByIntervals", v.bounded},
+                        {"budget", finite(f.budget)},
+                        {"specBudget", finite(f.specBudget)},
+                        {"plainBudget", finite(v.plainBudget)},
+                        {"specWidth", f.specWidth},
+                        {"deviceWidth", f.deviceWidth}});
+  return list;
+}
+
+nlohmann::json failuresOf(const KernelSummary& k, const SessionOptions& options) {
+  auto list = nlohmann::json::array();
+  for (const CaseRecord* r : k.records)
+    for (const std::string& message : r->messages)
+      list.push_back({{"case", r->name},
+                      {"reproduce", reproduceCommand(r->name, options)},
+                      {"message", message}});
+  return list;
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
+    }
+  }
+  return out;
+}
+
+std::string junitCase(const KernelSummary& k, const CaseRecord& r) {
+  std::string text = fmt::format(R"(    <testcase classname="{}" name="{}" time="{:.3f}">)",
+                                 escaped(k.kernel), escaped(r.name), r.seconds);
+  for (const std::string& m : r.messages)
+    text += fmt::format("\n      <failure message=\"{}\">{}</failure>",
+                        escaped(m.substr(0, m.find('\n'))), escaped(m));
+  if (r.unsupported)
+    text += fmt::format("\n      <skipped message=\"unsupported: {}\"/>", escaped(*r.unsupported));
+  else if (r.skipped)
+    text += fmt::format("\n      <skipped message=\"{}\"/>", escaped(*r.skipped));
+  return text + "</testcase>\n";
+}
+
+}  // namespace
+
+std::vector<KernelSummary> summarise(const std::vector<CaseRecord>& records) {
+  std::vector<KernelSummary> all;
+  for (const CaseRecord& r : records) {
+    auto found = std::ranges::find(all, r.kernel, &KernelSummary::kernel);
+    if (found == all.end()) {
+      all.push_back({.stage = r.kernel.substr(0, r.kernel.find('/')), .kernel = r.kernel});
+      found = all.end() - 1;
+    }
+    add(*found, r);
+  }
+  return all;
+}
+
+std::string reproduceCommand(const std::string& caseName, const SessionOptions& options) {
+  std::string command = fmt::format("./gnomon validate --filter '{}' --seed {}", caseName,
+                                    options.seed);
+  if (options.cases) command += fmt::format(" --cases {}", *options.cases);
+  if (!options.device.empty()) command += fmt::format(" --device '{}'", options.device);
+  for (const auto& [kernel, file] : options.kernels)
+    command += fmt::format(" --kernel '{}={}'", kernel, file.string());
+  return command;
+}
+
+std::string summaryTable(const std::vector<KernelSummary>& kernels, const Terminal& terminal) {
+  std::vector<std::vector<std::string>> rows = {
+      {"kernel", "class", "cases", "elements", "worst budget", "time"}};
+  for (const KernelSummary& k : kernels) {
+    const std::string cases = k.failed > 0    ? fmt::format("{} of {} failed", k.failed, k.cases)
+                              : k.skipped > 0 ? fmt::format("{} ({} skipped)", k.cases, k.skipped)
+                                              : fmt::format("{}", k.cases);
+    rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), cases,
+                    grouped(k.elements),
+                    k.maxBudget ? fmt::format("{:.3g}", *k.maxBudget) : "exact",
+                    fmt::format("{:.1f} s", k.seconds)});
+  }
+  return table(rows, "llrrrr");
+}
+
+std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session& session,
+                        const GpuInfo& gpu) {
+  auto stages = nlohmann::json::array();
+  std::size_t failed = 0;
+  for (const KernelSummary& k : kernels) {
+    failed += k.failed;
+    stages.push_back({{"stage", k.stage},
+                      {"kernel", k.kernel},
+                      {"class", nameOf(k.verdict)},
+                      {"widening", k.widening},
+                      {"cases", k.cases},
+                      {"failed", k.failed},
+                      {"skipped", k.skipped},
+                      {"elements", k.elements},
+                      {"outside", k.outside},
+                      {"ambiguous", k.ambiguous},
+                      {"reassociated", k.reassociated},
+                      {"maxBudget", finite(k.maxBudget)},
+                      {"seconds", k.seconds},
+                      {"unsupported", k.unsupported ? nlohmann::json(*k.unsupported) : nullptr},
+                      {"domains", domainsOf(k)},
+                      {"failures", failuresOf(k, session.options())}});
+  }
+  const nlohmann::json json = {{"schema", 1},
+                               {"device",
+                                {{"name", gpu.name},
+                                 {"driver", gpu.driver},
+                                 {"api", gpu.api},
+                                 {"subgroupSize", gpu.subgroupSize}}},
+                               {"seed", session.options().seed},
+                               {"stages", stages},
+                               {"failed", failed}};
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+std::string summaryJunit(const std::vector<KernelSummary>& kernels) {
+  std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n";
+  for (const KernelSummary& k : kernels) {
+    text += fmt::format(
+        "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" time=\"{:.3f}\">\n",
+        escaped(k.kernel), k.cases, k.failed, k.skipped, k.seconds);
+    for (const CaseRecord* r : k.records) text += junitCase(k, *r);
+    text += "  </testsuite>\n";
+  }
+  return text + "</testsuites>\n";
+}
+
+void writeText(const std::filesystem::path& file, const std::string& text) {
+  if (file == "-") {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    return;
+  }
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw UsageError(fmt::format("{}: cannot be written", file.string()));
+}
+
+}  // namespace gnomon

@@ -1,0 +1,406 @@
+#include "harness/verdict/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <mutex>
+#include <random>
+
+#include <fmt/format.h>
+
+#include "harness/verdict/parallel.h"
+
+namespace gnomon {
+namespace {
+
+/// One 32-bit scalar of an output element.
+struct Scalar {
+  std::string name;  // "F.y"
+  std::size_t field;
+  unsigned offset;
+  ScalarType type;
+  bool signOfZero;
+};
+
+std::vector<Scalar> scalarsOf(const Struct& layout) {
+  std::vector<Scalar> all;
+  for (std::size_t f = 0; f < layout.fields.size(); ++f) {
+    const Field& field = layout.fields[f];
+    for (unsigned c = 0; c < field.scalars; ++c) {
+      std::string suffix;
+      if (field.scalars > 1)
+        suffix = field.scalars <= 4 ? fmt::format(".{}", "xyzw"[c]) : fmt::format("[{}]", c);
+      all.push_back({field.name + suffix, f, field.offset + 4 * c, field.scalar, field.signOfZero});
+    }
+  }
+  return all;
+}
+
+/// Reads scalars of any type as double, which holds float and 32-bit integers exactly.
+class Results {
+ public:
+  Results(std::span<const std::byte> data, unsigned elementBytes)
+      : bytes(data), stride(elementBytes) {}
+
+  double operator()(std::size_t element, const Scalar& s) const {
+    std::uint32_t word = 0;
+    std::memcpy(&word, bytes.data() + element * stride + s.offset, sizeof word);
+    if (s.type == ScalarType::kUint) return word;
+    if (s.type == ScalarType::kInt) return static_cast<std::int32_t>(word);
+    return static_cast<double>(std::bit_cast<float>(word));
+  }
+
+ private:
+  std::span<const std::byte> bytes;
+  unsigned stride;
+};
+
+/// Ties go to the earlier element, so that the message does not depend on threads.
+void keepWorse(std::optional<Offender>& worst, Offender candidate) {
+  if (!worst || candidate.budget > worst->budget ||
+      (candidate.budget == worst->budget && candidate.element < worst->element))
+    worst = std::move(candidate);
+}
+
+double centre(const Bounded& b) { return std::clamp(b.value, b.lo, b.hi); }
+
+double median(std::vector<double>& values, double quantile = 0.5) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() +
+                  static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+/// Everything the judging of one output shares.
+class Judge {
+ public:
+  Judge(const Struct& structure, const Observation& seen, const Expectation& e, const Bounds& b,
+        const Policy& p, std::uint64_t s)
+      : expected(e),
+        bounds(b),
+        policy(p),
+        seed(s),
+        scalars(scalarsOf(structure)),
+        twin(seen.twin.at(e.buffer), structure.size),
+        plain(seen.plain.at(e.buffer), structure.size) {
+    result.buffer = e.buffer;
+    result.elements = e.elements;
+    result.problems = seen.findings;
+    result.fields.resize(structure.fields.size());
+    for (std::size_t f = 0; f < structure.fields.size(); ++f)
+      result.fields[f].name = structure.fields[f].name;
+    widths.resize(scalars.size());
+  }
+
+  Verdict run() {
+    const std::vector<std::size_t> sample = sampled();
+    judgeAll(sample, /*measureWidths=*/true);
+    takeMedians();
+    if (sample.size() < expected.elements) judgeAll(notCleared(sample), false);
+    decide();
+    return std::move(result);
+  }
+
+ private:
+  /// What one element's scalars may be, by each of the rules.
+  struct Intervals {
+    explicit Intervals(std::size_t n) : spec(n), plain(n), device(n) {}
+    std::vector<Bounded> spec, plain, device;
+  };
+
+  struct Widths {
+    std::vector<double> spec, device, halfDevice;
+  };
+
+  const Rules& deciding() const { return bounds.device ? *bounds.device : bounds.spec; }
+
+  /// Corners, both ends and one element of each of equal strides; all of a small case.
+  std::vector<std::size_t> sampled() const {
+    const std::size_t n = expected.elements;
+    const auto wanted = static_cast<std::size_t>(policy["boundedElements"]);
+    std::vector<std::size_t> chosen;
+    if (n <= wanted + expected.corners) {
+      for (std::size_t i = 0; i < n; ++i) chosen.push_back(i);
+      return chosen;
+    }
+    for (std::size_t i = 0; i < expected.corners; ++i) chosen.push_back(i);
+    std::mt19937_64 random(seed);
+    const std::size_t rest = n - expected.corners;
+    for (std::size_t k = 0; k < wanted; ++k) {
+      const std::size_t begin = k * rest / wanted, end = (k + 1) * rest / wanted;
+      chosen.push_back(expected.corners + begin + random() % (end - begin));
+    }
+    chosen.back() = n - 1;
+    return chosen;
+  }
+
+  /// Elements that the plain model does not clear under the narrowest intervals of the sample.
+  std::vector<std::size_t> notCleared(const std::vector<std::size_t>& sample) {
+    std::vector<double> slack;
+    for (Widths& w : widths) slack.push_back(median(w.halfDevice, policy["screeningQuantile"]));
+    std::vector<char> judged(expected.elements, 0);
+    for (std::size_t i : sample) judged[i] = 1;
+    std::vector<std::size_t> rest;
+    parallelFor(expected.elements, [&](std::size_t begin, std::size_t end) {
+      std::vector<double> values(scalars.size());
+      std::vector<std::size_t> mine;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (judged[i]) continue;
+        expected.plain(i, values);
+        if (!clears(i, values, slack)) mine.push_back(i);
+      }
+      const std::lock_guard lock(mutex);
+      rest.insert(rest.end(), mine.begin(), mine.end());
+    });
+    std::ranges::sort(rest);
+    return rest;
+  }
+
+  bool clears(std::size_t i, const std::vector<double>& values,
+              const std::vector<double>& slack) const {
+    for (std::size_t s = 0; s < scalars.size(); ++s) {
+      const double x = values[s], room = slack[s] * std::abs(x);
+      // Written so that a NaN on either side does not clear.
+      if (!(std::abs(twin(i, scalars[s]) - x) <= room)) return false;
+      if (!(std::abs(plain(i, scalars[s]) - x) <= room)) return false;
+    }
+    return true;
+  }
+
+  void judgeAll(const std::vector<std::size_t>& elements, bool measureWidths) {
+    result.bounded += elements.size();
+    parallelFor(elements.size(), [&](std::size_t begin, std::size_t end) {
+      Intervals allowed(scalars.size());
+      for (std::size_t k = begin; k < end; ++k) {
+        evaluate(deciding(), elements[k], allowed.device);
+        if (!measureWidths && admitsBoth(elements[k], allowed.device)) continue;
+        evaluate(bounds.spec, elements[k], allowed.spec);
+        evaluate(bounds.plain, elements[k], allowed.plain);
+        const std::lock_guard lock(mutex);
+        account(elements[k], allowed);
+        if (measureWidths) measure(allowed);
+      }
+    });
+  }
+
+  /// Inside the narrowest of the bounds, nothing is left to say about an element.
+  bool admitsBoth(std::size_t i, const std::vector<Bounded>& allowed) const {
+    for (std::size_t s = 0; s < scalars.size(); ++s)
+      if ((allowed[s].flags & (kAmbiguous | kUnspecified | kNotJudged)) != 0 ||
+          budgetUsed(twin(i, scalars[s]), allowed[s], scalars[s].signOfZero) > 0.5 ||
+          budgetUsed(plain(i, scalars[s]), allowed[s], false) > 0.5)
+        return false;
+    return true;
+  }
+
+  void evaluate(const Rules& rules, std::size_t i, std::vector<Bounded>& out) const {
+    const UseRules scope(rules);
+    expected.bounded(i, out);
+  }
+
+  void account(std::size_t i, const Intervals& allowed) {
+    const auto& [spec, forPlain, device] = allowed;
+    bool outSpec = false, outDevice = false, moved = false, ambiguous = false;
+    std::vector<char> fieldOut(result.fields.size(), 0);
+    for (std::size_t s = 0; s < scalars.size(); ++s) {
+      const double got = twin(i, scalars[s]), gotPlain = plain(i, scalars[s]);
+      const double bySpec = budgetUsed(got, spec[s], scalars[s].signOfZero);
+      const double byDevice = budgetUsed(got, device[s], scalars[s].signOfZero);
+      const double byPlain = budgetUsed(gotPlain, forPlain[s], false);
+      outSpec |= bySpec > 1;
+      outDevice |= byDevice > 1;
+      moved |= byPlain > 1;
+      ambiguous |= spec[s].ambiguous() || spec[s].notJudged();
+      noteUnspecified(i, s, spec[s]);
+      FieldVerdict& field = result.fields[scalars[s].field];
+      fieldOut[scalars[s].field] |= byDevice > 1;
+      field.specBudget = std::max(field.specBudget, bySpec);
+      if (byDevice > field.budget) field.budget = byDevice;
+      keepWorse(result.worst, {i, scalars[s].name, got, gotPlain, device[s].value, device[s].lo,
+                               device[s].hi, byDevice});
+      keepWorse(worstPlain, {i, scalars[s].name, got, gotPlain, forPlain[s].value, forPlain[s].lo,
+                             forPlain[s].hi, byPlain});
+      result.plainBudget = std::max(result.plainBudget, byPlain);
+    }
+    for (std::size_t f = 0; f < fieldOut.size(); ++f)
+      result.fields[f].outside += fieldOut[f] ? 1 : 0;
+    result.outside += outSpec;
+    result.outsideDevice += outDevice;
+    result.reassociated += moved;
+    result.ambiguous += ambiguous;
+    if (outSpec) offenders.push_back(i);
+  }
+
+  void noteUnspecified(std::size_t i, std::size_t s, const Bounded& b) {
+    if (!b.unspecified() || unspecifiedSeen) return;
+    unspecifiedSeen = true;
+    result.problems.push_back(
+        fmt::format("the model of {}[{}].{} reaches '{}' outside the domain in which Vulkan "
+                    "specifies it, so nothing can be judged there: the test asks too much, or the "
+                    "kernel's contract must avoid it",
+                    result.buffer, i, scalars[s].name,
+                    nameOf(unspecifiedOperations(b.flags).front())));
+  }
+
+  void measure(const Intervals& allowed) {
+    for (std::size_t s = 0; s < scalars.size(); ++s) {
+      const Bounded& spec = allowed.spec[s];
+      const Bounded& device = allowed.device[s];
+      const double x = std::abs(centre(device));
+      if (!(x > 0) || !std::isfinite(spec.hi - spec.lo)) continue;
+      widths[s].spec.push_back((spec.hi - spec.lo) / x);
+      if (bounds.device) widths[s].device.push_back((device.hi - device.lo) / x);
+      const double half = std::min(device.hi - device.value, device.value - device.lo) / x;
+      // A single admissible float rarely equals the double, so it has no room on one side.
+      if (half > 0) widths[s].halfDevice.push_back(half);
+    }
+  }
+
+  /// A field's width is that of its widest scalar.
+  void takeMedians() {
+    for (std::size_t s = 0; s < scalars.size(); ++s) {
+      FieldVerdict& field = result.fields[scalars[s].field];
+      field.specWidth = std::max(field.specWidth, median(widths[s].spec));
+      field.deviceWidth = std::max(field.deviceWidth, median(widths[s].device));
+    }
+  }
+
+  void decide() {
+    const double ambiguousShare =
+        static_cast<double>(result.ambiguous) / static_cast<double>(std::max<std::size_t>(1, result.bounded));
+    if (ambiguousShare > policy["ambiguousCap"])
+      result.problems.push_back(
+          fmt::format("{:.1f} % of the elements judged by intervals are ambiguous, more than the "
+                      "{:.0f} % at which a verdict still means something",
+                      100 * ambiguousShare, 100 * policy["ambiguousCap"]));
+    std::ranges::sort(offenders);
+    if (result.outside > 0) {
+      result.widening = smallestWidening();
+      result.verdict = result.widening > 0 ? Class::kEquivalent : Class::kWrong;
+    } else if (result.plainBudget > policy["plainBudget"]) {
+      result.worst = worstPlain;
+      result.problems.push_back(
+          fmt::format("the strict twin is inside, but the module as it is uses {:.3g} budgets where "
+                      "at most {:.0f} can be rearrangement",
+                      result.plainBudget, policy["plainBudget"]));
+    }
+    if (!result.problems.empty()) result.verdict = Class::kWrong;
+  }
+
+  /// The smallest k for which all offenders lie inside when every input and named intermediate is
+  /// widened by k ULP; 0 if none does.
+  int smallestWidening() const {
+    for (int k = 1; k <= static_cast<int>(policy["maxWidening"]); ++k) {
+      Rules rules = bounds.spec;
+      rules.widenUlp = k;
+      const UseRules scope(rules);
+      if (std::ranges::all_of(offenders, [&](std::size_t i) { return inside(i); })) return k;
+    }
+    return 0;
+  }
+
+  // Offenders are checked in the order of their index, so the first that fails ends it.
+  bool inside(std::size_t i) const {
+    std::vector<Bounded> allowed(scalars.size());
+    expected.bounded(i, allowed);
+    for (std::size_t s = 0; s < scalars.size(); ++s)
+      if (budgetUsed(twin(i, scalars[s]), allowed[s], scalars[s].signOfZero) > 1) return false;
+    return true;
+  }
+
+  const Expectation& expected;
+  const Bounds& bounds;
+  const Policy& policy;
+  std::uint64_t seed;
+  std::vector<Scalar> scalars;
+  Results twin, plain;
+  std::vector<Widths> widths;
+  std::vector<std::size_t> offenders;
+  std::optional<Offender> worstPlain;
+  bool unspecifiedSeen = false;
+  std::mutex mutex;
+  Verdict result;
+};
+
+std::string number(double x) { return fmt::format("{:.9g}", x); }
+
+std::string fieldTable(const Verdict& v) {
+  std::string table = fmt::format("  {:<12} {:>10}  {:>12}\n", "field", "outside", "worst budget");
+  for (const FieldVerdict& f : v.fields)
+    table += fmt::format("  {:<12} {:>10}  {:>12.3g}\n", f.name, f.outside, f.budget);
+  return table;
+}
+
+std::string worstElement(const Offender& o, const Verdict& v, const Expectation& expected) {
+  std::string text = fmt::format("worst: {}[{}].{}\n", v.buffer, o.element, o.field);
+  text += fmt::format("  got       {} (strict twin), {} (module as it is)\n", number(o.got),
+                      number(o.gotPlain));
+  text += fmt::format("  allowed   [{}, {}]\n", number(o.lo), number(o.hi));
+  text += fmt::format("  model     {}, so it is off by {:.3g} %\n", number(o.value),
+                      100 * std::abs(o.got - o.value) / std::abs(o.value));
+  return text + "  for the input\n" + expected.inputs(o.element);
+}
+
+std::string firstOutside(const Verdict& v) {
+  for (const FieldVerdict& f : v.fields)
+    if (f.outside > 0) return f.name;
+  return {};
+}
+
+}  // namespace
+
+std::string_view nameOf(Class c) {
+  return c == Class::kConforms ? "conforms" : c == Class::kEquivalent ? "equivalent" : "wrong";
+}
+
+Bounds Bounds::specification(bool roundingRte) {
+  const Rules either = Rules::specification();
+  return {.spec = roundingRte ? Rules::specification(Rounding::nearestEven) : either,
+          .plain = either,
+          .device = {}};
+}
+
+double Verdict::maxBudget() const {
+  double worstBudget = 0;
+  for (const FieldVerdict& f : fields) worstBudget = std::max(worstBudget, f.budget);
+  return worstBudget;
+}
+
+double budgetUsed(double got, const Bounded& allowed, bool signOfZero) {
+  if (std::isnan(got)) return allowed.mayBeNan() ? 0 : kInfinity;
+  if (allowed.unspecified()) return 0;
+  const double x = centre(allowed);
+  if (got == x) {
+    const bool zeroMatters = signOfZero && got == 0 && allowed.lo == allowed.hi;
+    return zeroMatters && std::signbit(got) != std::signbit(allowed.value) ? kInfinity : 0;
+  }
+  const double room = got > x ? allowed.hi - x : x - allowed.lo;
+  if (!std::isfinite(got)) return room == kInfinity || got == (got > x ? allowed.hi : allowed.lo) ? 1 : kInfinity;
+  return room > 0 ? std::abs(got - x) / room : kInfinity;
+}
+
+Verdict judge(const Struct& layout, const Observation& seen, const Expectation& expected,
+              const Bounds& bounds, const Policy& policy, std::uint64_t seed) {
+  return Judge(layout, seen, expected, bounds, policy, seed).run();
+}
+
+std::string explain(const Verdict& v, const Expectation& expected) {
+  if (v.ok() && v.outsideDevice == 0) return {};
+  std::string text;
+  for (const std::string& p : v.problems) text += "- " + p + "\n";
+  const std::size_t out = std::max(v.outside, v.outsideDevice);
+  if (out > 0) {
+    text += fmt::format("{} of {} elements of '{}' are outside what {} may return\n", out,
+                        v.elements, v.buffer,
+                        v.outside > 0 ? "a conforming device" : "this device, by its measured errors,");
+    text += fieldTable(v);
+    text += fmt::format("The first field that is wrong, in the order of the contract, is {}.\n",
+                        firstOutside(v));
+  }
+  if (v.worst && v.worst->budget > 1) text += worstElement(*v.worst, v, expected);
+  return text;
+}
+
+}  // namespace gnomon

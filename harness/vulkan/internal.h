@@ -1,0 +1,258 @@
+// Inside harness/vulkan: the instance, the device, what it owns. No other folder includes this.
+//
+// Where things go that are not here yet: images and samplers are further Owned handles beside
+// Buffer (memory.cpp), and further descriptor types in descriptorType() (program.cpp) and
+// DescriptorNeeds (run.cpp); graphics pipelines are further programs that run.cpp records.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vulkan/vulkan.h>
+
+#include "harness/vulkan/gpu.h"
+
+namespace gnomon::vulkan {
+
+/// "vkCreateBuffer: VK_ERROR_OUT_OF_DEVICE_MEMORY".
+std::string callFailed(const char* call, VkResult result);
+
+// ---- instance.cpp --------------------------------------------------------------------------
+
+/// Validation messages; the layer may call from any thread that is inside a Vulkan call.
+class MessageLog {
+ public:
+  void add(std::string message);
+  std::vector<std::string> take();
+
+ private:
+  std::mutex mutex;
+  std::vector<std::string> messages;
+};
+
+/// A Vulkan instance. Throws DeviceError where the loader or the validation layer is unusable.
+class Instance {
+ public:
+  explicit Instance(bool validation);
+  ~Instance();
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+
+  /// Null where no driver is installed.
+  VkInstance get() const { return handle; }
+
+  MessageLog log;
+
+ private:
+  void create(bool validation);
+
+  VkInstance handle = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
+};
+
+// ---- adapter.cpp, features.cpp -------------------------------------------------------------
+
+/// Every optional feature that a kernel may use, as Vulkan takes it.
+struct FeatureChain {
+  VkPhysicalDeviceFeatures2 core{};
+  VkPhysicalDeviceVulkan11Features v11{};
+  VkPhysicalDeviceVulkan12Features v12{};
+  VkPhysicalDeviceVulkan13Features v13{};
+
+  /// Chains the structures up for vkGetPhysicalDeviceFeatures2 or VkDeviceCreateInfo.
+  VkPhysicalDeviceFeatures2* link(bool has13);
+};
+
+/// The listed features that the device has: what a Gpu enables.
+FeatureChain featuresOf(VkPhysicalDevice device, bool has13);
+
+/// The listed features by name, true where the device has them.
+std::map<std::string, bool> namesOf(const FeatureChain& features);
+
+/// A physical device with a compute queue and Vulkan 1.2.
+struct Adapter {
+  VkPhysicalDevice handle = VK_NULL_HANDLE;
+  GpuInfo info;
+  VkPhysicalDeviceLimits limits{};
+  bool has13 = false;
+  std::uint32_t queueFamily = 0;
+  unsigned timestampBits = 0;  ///< of its queue; 0: no timestamps
+};
+
+/// In the loader's order.
+std::vector<Adapter> adaptersOf(const Instance& instance);
+
+// ---- device.cpp ----------------------------------------------------------------------------
+
+/// The VkDevice itself. It outlives everything made on it, since each such thing holds the Device.
+struct DeviceHandle {
+  std::unique_ptr<Instance> instance;
+  VkDevice handle = VK_NULL_HANDLE;
+  /// A wait ran out, so work may still run on the device. Its objects may not be destroyed then
+  /// (vkDestroyBuffer: "all submitted commands that refer to buffer must have completed") and
+  /// vkDestroyDevice may never return: all of them are leaked.
+  bool hung = false;
+  bool lost = false;  ///< VK_ERROR_DEVICE_LOST; destroying is allowed
+
+  DeviceHandle(std::unique_ptr<Instance> instance, const Adapter& adapter);
+  ~DeviceHandle();
+  DeviceHandle(const DeviceHandle&) = delete;
+  DeviceHandle& operator=(const DeviceHandle&) = delete;
+
+  /// Throws GpuError unless the call succeeded; notes a lost device.
+  void check(VkResult result, const char* call);
+};
+
+/// A Vulkan object of a device, destroyed with its owner.
+template <typename T, void (*destroy)(VkDevice, T, const VkAllocationCallbacks*)>
+class Owned {
+ public:
+  Owned() = default;
+  Owned(const DeviceHandle& owner, T object) : device(&owner), handle(object) {}
+  Owned(Owned&& other) noexcept
+      : device(other.device), handle(std::exchange(other.handle, VK_NULL_HANDLE)) {}
+  Owned& operator=(Owned&& other) noexcept {
+    std::swap(device, other.device);
+    std::swap(handle, other.handle);
+    return *this;
+  }
+  ~Owned() {
+    if (handle != VK_NULL_HANDLE && !device->hung) destroy(device->handle, handle, nullptr);
+  }
+
+  T get() const { return handle; }
+
+ private:
+  const DeviceHandle* device = nullptr;
+  T handle = VK_NULL_HANDLE;
+};
+
+using OwnedMemory = Owned<VkDeviceMemory, vkFreeMemory>;
+using OwnedBuffer = Owned<VkBuffer, vkDestroyBuffer>;
+using OwnedCommandPool = Owned<VkCommandPool, vkDestroyCommandPool>;
+using OwnedFence = Owned<VkFence, vkDestroyFence>;
+using OwnedQueryPool = Owned<VkQueryPool, vkDestroyQueryPool>;
+using OwnedDescriptorPool = Owned<VkDescriptorPool, vkDestroyDescriptorPool>;
+using OwnedSetLayout = Owned<VkDescriptorSetLayout, vkDestroyDescriptorSetLayout>;
+using OwnedPipelineLayout = Owned<VkPipelineLayout, vkDestroyPipelineLayout>;
+using OwnedPipeline = Owned<VkPipeline, vkDestroyPipeline>;
+using OwnedShaderModule = Owned<VkShaderModule, vkDestroyShaderModule>;
+
+/// A buffer with memory of its own.
+struct Buffer {
+  OwnedMemory memory;  // declared first: the buffer goes before what it is bound to
+  OwnedBuffer buffer;
+  std::byte* mapped = nullptr;  ///< where the host sees the memory; null: it does not
+  VkDeviceSize bytes = 0;       ///< of the VkBuffer; a multiple of four, never 0
+};
+
+/// The device, its queue, and one command buffer that is recorded and waited for at once.
+class Device {
+ public:
+  Device(std::unique_ptr<Instance> instance, const Adapter& chosen, bool staged);
+
+  /// Starts recording. All that was written before is visible to what is recorded.
+  VkCommandBuffer begin();
+  /// Submits what was recorded and waits; its results are visible to the host. Throws GpuError on
+  /// loss, or when the limit passes.
+  void finish(std::chrono::milliseconds limit);
+  /// Throws GpuError on a device that is hung or lost.
+  void requireAlive() const;
+  void check(VkResult result, const char* call) { owner.check(result, call); }
+
+  enum class Memory { device, staging };
+  Buffer makeBuffer(std::size_t bytes, Memory where);
+  void upload(const Buffer& to, std::size_t offset, std::span<const std::byte> data);
+  void download(const Buffer& from, std::size_t offset, std::span<std::byte> data);
+  void fill(const Buffer& buffer, std::uint32_t pattern);
+
+  DeviceHandle owner;  // declared first: destroyed last
+  const Adapter adapter;
+
+ private:
+  std::uint32_t memoryType(std::uint32_t allowed, Memory where) const;
+  const Buffer& staging();
+
+  bool staged = false;
+  VkPhysicalDeviceMemoryProperties memory{};
+  VkQueue queue = VK_NULL_HANDLE;
+  OwnedCommandPool pool;
+  VkCommandBuffer recorded = VK_NULL_HANDLE;
+  OwnedFence fence;
+  Buffer stagingBuffer;  ///< made on first use
+};
+
+/// Makes every write so far visible to everything after it, on the device.
+void fullBarrier(VkCommandBuffer commands);
+
+// ---- program.cpp ---------------------------------------------------------------------------
+
+VkDescriptorType descriptorType(const BindingSlot& slot);
+
+/// What a program is to the device; GpuProgram holds it.
+struct Program {
+  std::shared_ptr<Device> device;
+  std::vector<BindingSlot> slots;
+  unsigned pushBytes = 0;
+  std::vector<OwnedSetLayout> sets;  ///< by set number; empty layouts fill gaps
+  OwnedPipelineLayout layout;
+  OwnedPipeline pipeline;
+};
+
+Program makeProgram(std::shared_ptr<Device> device, const ProgramDescription& description);
+
+// ---- run.cpp -------------------------------------------------------------------------------
+
+/// A dispatch with its parts resolved.
+struct BoundRange {
+  BindingSlot slot;
+  VkDescriptorBufferInfo buffer{};
+};
+
+struct Command {
+  const Program* program = nullptr;
+  std::vector<BoundRange> buffers;
+  const Dispatch* dispatch = nullptr;
+};
+
+/// What a descriptor pool must hold.
+struct DescriptorNeeds {
+  std::uint32_t sets = 0;
+  std::map<VkDescriptorType, std::uint32_t> descriptors;
+
+  void add(const Program& program);
+  void widenTo(const DescriptorNeeds& other);
+  bool fitsIn(const DescriptorNeeds& capacity) const;
+};
+
+/// Records and runs commands; keeps its pools from run to run.
+class Runner {
+ public:
+  explicit Runner(std::shared_ptr<Device> owner) : device(std::move(owner)) {}
+
+  /// GPU nanoseconds of each command; 0 without timestamps.
+  std::vector<double> run(std::span<const Command> list, std::chrono::milliseconds limit);
+
+ private:
+  void reservePool(const DescriptorNeeds& needs);
+  void reserveQueries(std::uint32_t count);
+  std::vector<VkDescriptorSet> describe(const Command& command);
+  void record(VkCommandBuffer commands, const Command& command, std::uint32_t firstQuery);
+  std::vector<double> readTimes(std::size_t count);
+
+  std::shared_ptr<Device> device;
+  OwnedDescriptorPool pool;
+  DescriptorNeeds poolCapacity;
+  OwnedQueryPool queries;
+  std::uint32_t queryCapacity = 0;
+};
+
+}  // namespace gnomon::vulkan

@@ -1,0 +1,39 @@
+// Host side of stage brdf.
+#include "brdf.h"
+
+#include "harness/program/kernel.h"
+
+namespace gnomon::brdf {
+namespace {
+
+Struct sample() {
+  return describe<Sample>("Sample", field("normal", &Sample::normal),
+                          field("roughness", &Sample::roughness), field("view", &Sample::view),
+                          field("metallic", &Sample::metallic), field("light", &Sample::light),
+                          field("albedo", &Sample::albedo),
+                          field("irradiance", &Sample::irradiance));
+}
+
+Struct shaded() {
+  return describe<Shaded>("Shaded", field("D", &Shaded::D), field("G", &Shaded::G),
+                          field("F", &Shaded::F), field("ambientF", &Shaded::ambientF),
+                          field("diffuse", &Shaded::diffuse), field("specular", &Shaded::specular),
+                          field("radiance", &Shaded::radiance));
+}
+
+const bool registered = registerKernel({
+    .order = 1,
+    .stage = "brdf",
+    .entry = "evaluate",
+    .file = "brdf/evaluate.comp",
+    .buffers = {{"samples", kSamples, Access::kRead, sample()},
+                {"results", kResults, Access::kWrite, shaded()}},
+    .push = describe<Evaluate>("Evaluate", field("count", &Evaluate::count)),
+    .grid = linearGrid(kGroupSize),
+    .features = {"scalarBlockLayout"},
+    .deterministic = true,
+    .summary = "Cook-Torrance D, G, F, lobes and shaded radiance for arrays of inputs",
+});
+
+}  // namespace
+}  // namespace gnomon::brdf

@@ -1,0 +1,54 @@
+// Contract of stage brdf: one record in, one record out, for every thread.
+// Linear light throughout; scalar layout; read by GLSL and by C++.
+#ifndef GNOMON_BRDF_H
+#define GNOMON_BRDF_H
+
+#include "../contract.h"
+
+GNOMON_CONTRACT(brdf)
+
+// What is evaluated. Bad input is part of the contract: a component that is NaN or infinite counts
+// as 0; ranges are enforced by clamping; a vector whose largest component is not within
+// [kShortestVector, kLongestVector] counts as the zero vector, and a zero vector makes every output 0.
+// So does a light so nearly opposite to the view that no component of v + l reaches kShortestHalf:
+// the half vector's direction would be rounding noise.
+struct Sample {
+  vec3 normal;      // n, any length
+  float roughness;  // perceptual r, clamped to [kMinRoughness, 1]
+  vec3 view;        // v, towards the eye, any length
+  float metallic;   // clamped to [0, 1]
+  vec3 light;       // l, towards the light, any length
+  vec3 albedo;      // base colour, clamped to [0, 1]
+  vec3 irradiance;  // of the light at normal incidence, W/m^2, clamped to [0, kMaxIrradiance]
+};
+
+struct Shaded {
+  float D;          // GGX normal distribution, 1/sr
+  float G;          // Smith shadowing-masking, Schlick-GGX with k for direct light, [0, 1]
+  vec3 F;           // Schlick reflectance at VoH, [0, 1]
+  vec3 ambientF;    // Schlick reflectance at NoV, limited by 1 - r, [0, 1]
+  vec3 diffuse;     // Lambert lobe, (1 - F)(1 - metallic) albedo / pi, 1/sr
+  vec3 specular;    // Cook-Torrance lobe, D G F / max(4 NoV NoL, kMinDenominator), 1/sr
+  vec3 radiance;    // (diffuse + specular) NoL irradiance, W/(m^2 sr)
+};
+
+struct Evaluate {  // push constants
+  uint count;      // samples; results beyond are not touched
+};
+
+const float kMinRoughness = 0.045f;
+const float kMinNoV = 1e-4f;
+const float kMinDenominator = 1e-4f;
+const float kDielectricF0 = 0.04f;
+const float kMaxIrradiance = 1e6f;
+const float kShortestVector = 8.8817841970012523e-16f;  // 2^-50
+const float kLongestVector = 1125899906842624.0f;       // 2^50
+const float kShortestHalf = 1.52587890625e-5f;          // 2^-16
+
+const uint kSamples = 0;  // binding numbers, set 0
+const uint kResults = 1;
+const uint kGroupSize = 64;
+
+GNOMON_CONTRACT_END
+
+#endif

@@ -1,0 +1,68 @@
+#include "reference/bound/rules.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace gnomon {
+namespace {
+
+// Tables "Precision of Core SPIR-V Instructions" and "Precision of GLSL.std.450 Instructions",
+// single precision.
+constexpr double kDivideUlp = 2.5;
+constexpr double kInverseSqrtUlp = 2;
+constexpr double kLogUlp = 3;             // for arguments outside [0.5, 2]
+constexpr double kLogAbsolute = 0x1p-21;  // for arguments in [0.5, 2]
+constexpr double kSineAbsolute = 0x1p-11;
+constexpr double kAtanUlp = 4096;
+
+// 3 + 2|x| ULP.
+Error expError(double lo, double hi) { return {3 + 2 * std::max(std::abs(lo), std::abs(hi)), 0}; }
+
+Error logError(double lo, double hi) {
+  const bool meetsInside = hi >= 0.5 && lo <= 2;
+  const bool meetsOutside = lo < 0.5 || hi > 2;
+  return {meetsOutside ? kLogUlp : 0, meetsInside ? kLogAbsolute : 0};
+}
+
+}  // namespace
+
+std::optional<Operation> operationNamed(std::string_view name) {
+  const auto* const found = std::find(kOperationNames.begin(), kOperationNames.end(), name);
+  if (found == kOperationNames.end()) return std::nullopt;
+  return static_cast<Operation>(found - kOperationNames.begin());
+}
+
+Rules Rules::specification(Rounding rounding) {
+  Rules result;
+  result.rounding = rounding;
+  return result;
+}
+
+Error Rules::error(Operation operation, double lo, double hi) const {
+  if (const auto& known = measuredError(operation)) return *known;
+  switch (operation) {
+    case Operation::divide:
+      return {kDivideUlp, 0};
+    case Operation::inverseSqrt:
+      return {kInverseSqrtUlp, 0};
+    case Operation::exp:
+    case Operation::exp2:
+      return expError(lo, hi);
+    case Operation::log:
+    case Operation::log2:
+      return logError(lo, hi);
+    case Operation::sin:
+    case Operation::cos:
+      return {0, kSineAbsolute};
+    case Operation::atan:
+    case Operation::atan2:
+      return {kAtanUlp, 0};
+    default:
+      throw std::logic_error("Rules::error: " + std::string(nameOf(operation)) +
+                             " inherits its precision from a formula and was not measured");
+  }
+}
+
+}  // namespace gnomon

@@ -1,0 +1,139 @@
+#include "reference/brdf/evaluate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "reference/bound/bounded.h"
+
+namespace gnomon::brdf {
+namespace {
+
+template <class T>
+T pi() {
+  return T(std::numbers::pi_v<float>);
+}
+
+float finiteOrZero(float x) { return std::isfinite(x) ? x : 0.0f; }
+
+vec3 finiteOrZero(const vec3& v) {
+  return {finiteOrZero(v.x), finiteOrZero(v.y), finiteOrZero(v.z)};
+}
+
+template <class T>
+Vec3<T> zero() {
+  return {T(0), T(0), T(0)};
+}
+
+template <class T>
+auto isZero(const Vec3<T>& v) {
+  return v.x == T(0) && v.y == T(0) && v.z == T(0);
+}
+
+/// v / |v|, or zero for a vector that the contract counts as zero.
+template <class T>
+Vec3<T> unitOrZero(const Vec3<T>& v, float shortest) {
+  const T largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
+  const auto usable = largest >= T(shortest) && largest <= T(kLongestVector);
+  return select(usable, v * inversesqrt(dot(v, v)), zero<T>());
+}
+
+template <class T>
+Vec3<T> direction(const vec3& v) {
+  return unitOrZero(input<T>(finiteOrZero(v)), kShortestVector);
+}
+
+template <class T>
+T cosine(const Vec3<T>& a, const Vec3<T>& b) {
+  return clamp(dot(a, b), T(0), T(1));
+}
+
+template <class T>
+T limited(float x, float lo, float hi) {
+  return clamp(input<T>(finiteOrZero(x)), T(lo), T(hi));
+}
+
+template <class T>
+Vec3<T> limited(const vec3& v, float hi) {
+  return {limited<T>(v.x, 0, hi), limited<T>(v.y, 0, hi), limited<T>(v.z, 0, hi)};
+}
+
+template <class T>
+T pow5(const T& x) {
+  const T x2 = x * x;
+  return x2 * x2 * x;
+}
+
+template <class T>
+Vec3<T> splat(const T& x) {
+  return {x, x, x};
+}
+
+}  // namespace
+
+template <class T>
+T D_GGX(const Vec3<T>& n, const Vec3<T>& h, const T& alpha) {
+  const Vec3<T> sine = cross(n, h);
+  const T cosTheta = cosine(n, h);
+  const T alpha2 = alpha * alpha;
+  const T d = dot(sine, sine) + cosTheta * cosTheta * alpha2;
+  return alpha2 / (pi<T>() * d * d);
+}
+
+template <class T>
+T kDirect(const T& r) {
+  return (r + T(1)) * (r + T(1)) * T(0.125f);
+}
+
+template <class T>
+T G1_Schlick(const T& NoX, const T& k) {
+  return NoX / (NoX * (T(1) - k) + k);
+}
+
+template <class T>
+Vec3<T> F_Schlick(const T& VoH, const Vec3<T>& F0) {
+  return F0 + (splat(T(1)) - F0) * pow5(T(1) - VoH);
+}
+
+template <class T>
+Vec3<T> F_SchlickRoughness(const T& NoV, const Vec3<T>& F0, const T& r) {
+  return F0 + (max(splat(T(1) - r), F0) - F0) * pow5(T(1) - NoV);
+}
+
+template <class T>
+ShadedOf<T> evaluate(const Sample& s) {
+  const Vec3<T> n = direction<T>(s.normal), v = direction<T>(s.view), l = direction<T>(s.light);
+  const Vec3<T> h = unitOrZero(v + l, kShortestHalf);
+  if (isZero(n) || isZero(v) || isZero(l) || isZero(h))
+    return {T(0), T(0), zero<T>(), zero<T>(), zero<T>(), zero<T>(), zero<T>()};
+
+  const T r = limited<T>(s.roughness, kMinRoughness, 1);
+  const T metallic = limited<T>(s.metallic, 0, 1);
+  const Vec3<T> albedo = limited<T>(s.albedo, 1);
+  const Vec3<T> irradiance = limited<T>(s.irradiance, kMaxIrradiance);
+  const T NoV = max(cosine(n, v), T(kMinNoV));
+  const T NoL = cosine(n, l);
+  const T VoH = cosine(v, h);
+  const Vec3<T> F0 = mix(splat(T(kDielectricF0)), albedo, metallic);
+  const T k = kDirect(r);
+
+  ShadedOf<T> o;
+  o.D = D_GGX(n, h, r * r);
+  o.G = G1_Schlick(NoV, k) * G1_Schlick(NoL, k);
+  o.F = F_Schlick(VoH, F0);
+  o.ambientF = F_SchlickRoughness(NoV, F0, r);
+  o.diffuse = (splat(T(1)) - o.F) * (T(1) - metallic) * albedo / pi<T>();
+  o.specular = o.F * (o.D * o.G / max(T(4) * NoV * NoL, T(kMinDenominator)));
+  o.radiance = (o.diffuse + o.specular) * NoL * irradiance;
+  return o;
+}
+
+template double D_GGX(const Vec3<double>&, const Vec3<double>&, const double&);
+template double kDirect(const double&);
+template double G1_Schlick(const double&, const double&);
+template Vec3<double> F_Schlick(const double&, const Vec3<double>&);
+template Vec3<double> F_SchlickRoughness(const double&, const Vec3<double>&, const double&);
+template ShadedOf<double> evaluate(const Sample&);
+template ShadedOf<Bounded> evaluate(const Sample&);
+
+}  // namespace gnomon::brdf

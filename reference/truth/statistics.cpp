@@ -1,0 +1,47 @@
+#include "reference/truth/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <mpfr.h>
+
+namespace gnomon::truth {
+
+double chiSquareTail(double statistic, double degrees) {
+  constexpr mpfr_prec_t kBits = 64;
+  mpfr_t a, x, upper, whole;
+  mpfr_inits2(kBits, a, x, upper, whole, static_cast<mpfr_ptr>(nullptr));
+  mpfr_set_d(a, degrees / 2, MPFR_RNDN);
+  mpfr_set_d(x, statistic / 2, MPFR_RNDN);
+  mpfr_gamma_inc(upper, a, x, MPFR_RNDN);
+  mpfr_gamma(whole, a, MPFR_RNDN);
+  mpfr_div(upper, upper, whole, MPFR_RNDN);
+  const double tail = mpfr_get_d(upper, MPFR_RNDN);
+  mpfr_clears(a, x, upper, whole, static_cast<mpfr_ptr>(nullptr));
+  return tail;
+}
+
+double chiSquareTest(const std::vector<double>& observed, const std::vector<double>& expected) {
+  constexpr double kLeastExpected = 5;
+  std::vector<std::size_t> order(expected.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });
+  double statistic = 0, bins = 0, pooledObserved = 0, pooledExpected = 0;
+  for (const std::size_t bin : order) {
+    pooledObserved += observed[bin];
+    pooledExpected += expected[bin];
+    if (pooledExpected < kLeastExpected) continue;
+    statistic += (pooledObserved - pooledExpected) * (pooledObserved - pooledExpected) /
+                 pooledExpected;
+    bins += 1;
+    pooledObserved = pooledExpected = 0;
+  }
+  return chiSquareTail(statistic, bins - 1);
+}
+
+double sidak(double alpha, std::size_t n) {
+  return -std::expm1(std::log1p(-alpha) / static_cast<double>(n));
+}
+
+}  // namespace gnomon::truth

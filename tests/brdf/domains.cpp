@@ -1,0 +1,156 @@
+#include "tests/brdf/domains.h"
+
+#include <array>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace gnomon::brdf {
+namespace {
+
+vec3 scaled(const glm::dvec3& direction, double length) { return vec3(direction * length); }
+
+/// Directions are normalised by the kernel, so their length is stimulus too: mostly 1, else any
+/// power of two between 2^-40 and 2^40.
+double anyLength(Random& random) {
+  return random.chance(0.75) ? 1 : std::exp2(random.uniform(-40, 40));
+}
+
+vec3 colour(Random& random) {
+  return {static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
+          static_cast<float>(random.uniform())};
+}
+
+/// Dielectric, metal and everything between, a third each.
+float metalness(Random& random) {
+  const double u = random.uniform(0, 3);
+  return u < 1 ? 0.0f : u < 2 ? 1.0f : static_cast<float>(u - 2);
+}
+
+Sample shaded(Random& random, const glm::dvec3& n, const glm::dvec3& v, const glm::dvec3& l,
+              double roughness) {
+  return {.normal = scaled(n, anyLength(random)),
+          .roughness = static_cast<float>(roughness),
+          .view = scaled(v, anyLength(random)),
+          .metallic = metalness(random),
+          .light = scaled(l, anyLength(random)),
+          .albedo = colour(random),
+          .irradiance = colour(random) * static_cast<float>(random.logUniform(0.01, 100))};
+}
+
+template <class Make>
+std::vector<Sample> repeat(std::size_t n, std::uint64_t seed, Make make) {
+  Random random(seed);
+  std::vector<Sample> all;
+  all.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) all.push_back(make(random));
+  return all;
+}
+
+/// A direction whose cosine with n is near 0: half of them within the clamp kMinNoV of it.
+glm::dvec3 nearHorizon(Random& random, const glm::dvec3& n) {
+  const double cosine = random.chance(0.5) ? random.uniform(-0.01, 0.05)
+                                           : random.uniform(-2 * kMinNoV, 2 * kMinNoV);
+  return around(n, std::acos(cosine), random.uniform(0, 2 * std::numbers::pi));
+}
+
+/// Every member that a special value is put into.
+constexpr std::size_t kScalars = sizeof(Sample) / sizeof(float);
+
+float& scalar(Sample& sample, std::size_t index) {
+  return reinterpret_cast<float*>(&sample)[index];
+}
+
+}  // namespace
+
+std::vector<Sample> bulk(std::size_t n, std::uint64_t seed) {
+  return repeat(n, seed, [](Random& random) {
+    return shaded(random, random.direction(), random.direction(), random.direction(),
+                  random.uniform(0.2, 1));
+  });
+}
+
+std::vector<Sample> lobe(std::size_t n, std::uint64_t seed) {
+  return repeat(n, seed, [](Random& random) {
+    const double r = random.uniform(0, 0.2), alpha = std::max(r, double{kMinRoughness}) * r;
+    const double u = random.uniform();
+    const glm::dvec3 normal = random.direction();
+    const glm::dvec3 h = around(normal, std::atan(alpha * std::sqrt(u / (1 - u))),
+                                random.uniform(0, 2 * std::numbers::pi));
+    const glm::dvec3 v = around(normal, std::acos(random.uniform(0.1, 1)),
+                                random.uniform(0, 2 * std::numbers::pi));
+    return shaded(random, normal, v, 2 * glm::dot(v, h) * h - v, r);
+  });
+}
+
+std::vector<Sample> grazing(std::size_t n, std::uint64_t seed) {
+  return repeat(n, seed, [](Random& random) {
+    const glm::dvec3 normal = random.direction();
+    const bool view = random.chance(0.6), light = !view || random.chance(0.2);
+    const glm::dvec3 v = view ? nearHorizon(random, normal) : random.direction();
+    const glm::dvec3 l = light ? nearHorizon(random, normal) : random.direction();
+    return shaded(random, normal, v, l, random.uniform(0, 1));
+  });
+}
+
+std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
+  return repeat(n, seed, [](Random& random) {
+    return shaded(random, random.direction(), random.direction(), random.direction(),
+                  random.uniform(0.8, 1.2));
+  });
+}
+
+std::vector<Sample> degenerate() {
+  using Limits = std::numeric_limits<float>;
+  constexpr std::array kSpecial = {
+      0.0f,          -0.0f,          1.0f,           -1.0f,          0.5f,
+      2.0f,          -2.0f,          Limits::min(),  -Limits::min(), Limits::denorm_min(),
+      Limits::max(), Limits::lowest(), Limits::infinity(), -Limits::infinity(),
+      Limits::quiet_NaN(), -Limits::quiet_NaN(), kMinRoughness, kShortestVector, kLongestVector,
+      1e-10f,        1e10f,          1e-30f,         1e30f};
+  const Sample ordinary{.normal = {0.1f, 0.2f, 0.9f},
+                        .roughness = 0.4f,
+                        .view = {0.3f, -0.2f, 0.8f},
+                        .metallic = 0.3f,
+                        .light = {-0.5f, 0.1f, 0.7f},
+                        .albedo = {0.9f, 0.5f, 0.2f},
+                        .irradiance = {3.0f, 2.0f, 1.0f}};
+  std::vector<Sample> all = {ordinary};
+  for (std::size_t i = 0; i < kScalars; ++i)
+    for (const float a : kSpecial) {
+      Sample one = ordinary;
+      scalar(one, i) = a;
+      all.push_back(one);
+      for (const float b : kSpecial) {
+        Sample two = one;
+        scalar(two, (i + 1) % kScalars) = b;
+        all.push_back(two);
+      }
+    }
+  for (const float a : kSpecial)
+    for (vec3 Sample::*vector : {&Sample::normal, &Sample::view, &Sample::light, &Sample::albedo,
+                                 &Sample::irradiance}) {
+      Sample whole = ordinary;
+      whole.*vector = vec3(a);
+      all.push_back(whole);
+      Sample same = ordinary;
+      same.normal = same.view = same.light = whole.*vector;
+      all.push_back(same);
+    }
+  Sample opposite = ordinary;
+  opposite.light = -opposite.view;
+  all.push_back(opposite);
+  return all;
+}
+
+std::string describe(const Sample& s) {
+  const auto vector = [](const char* name, const vec3& v) {
+    return fmt::format("    {:<11}({:.9g}, {:.9g}, {:.9g})\n", name, v.x, v.y, v.z);
+  };
+  return vector("normal", s.normal) + fmt::format("    {:<11}{:.9g}\n", "roughness", s.roughness) +
+         vector("view", s.view) + fmt::format("    {:<11}{:.9g}\n", "metallic", s.metallic) +
+         vector("light", s.light) + vector("albedo", s.albedo) +
+         vector("irradiance", s.irradiance);
+}
+
+}  // namespace gnomon::brdf

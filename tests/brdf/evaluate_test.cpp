@@ -1,0 +1,184 @@
+// brdf/evaluate: the kernel against the model over five domains, laws on the kernel, bad input.
+//
+// Covered: every field of the result inside its interval in bulk, lobe, grazing, rough and
+// degenerate domains; sizes around a group; reciprocity; independence of vector length; bounds of
+// every quantity; metals without diffuse; F monotone; the closed form E(alpha 1, NoV 1, F 1).
+// Not covered: multiple scattering (the contract has none).
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "harness/cases/kernel_case.h"
+#include "reference/brdf/evaluate.h"
+#include "reference/truth/quadrature.h"
+#include "tests/brdf/domains.h"
+
+namespace gnomon::brdf {
+namespace {
+
+class BrdfEvaluate : public KernelCase {
+ protected:
+  BrdfEvaluate() : KernelCase("brdf/evaluate") {}
+
+  Observation dispatch(const std::vector<Sample>& samples) {
+    const Evaluate push{.count = static_cast<uint>(samples.size())};
+    return run({.inputs = {{"samples", std::as_bytes(std::span(samples))}},
+                .outputs = {{"results", samples.size()}},
+                .push = std::as_bytes(std::span(&push, 1)),
+                .items = samples.size()});
+  }
+
+  std::vector<Shaded> shade(const std::vector<Sample>& samples) {
+    checked(samples.size());
+    return elementsOf<Shaded>(dispatch(samples).twin.at("results"));
+  }
+
+  void expectInsideTheBound(const std::vector<Sample>& samples) {
+    expectConforms(dispatch(samples),
+                   expectationOf(
+                       "results", samples.size(),
+                       [&samples]<class T>(std::size_t i) { return evaluate<T>(samples[i]); },
+                       [&samples](std::size_t i) { return describe(samples[i]); }));
+  }
+};
+
+TEST_F(BrdfEvaluate, BulkStaysInsideTheBound) {
+  expectInsideTheBound(bulk(generated("bulkElements"), caseSeed()));
+}
+
+TEST_F(BrdfEvaluate, LobeStaysInsideTheBound) {
+  expectInsideTheBound(lobe(generated("elementsPerDomain"), caseSeed()));
+}
+
+TEST_F(BrdfEvaluate, GrazingStaysInsideTheBound) {
+  expectInsideTheBound(grazing(generated("elementsPerDomain"), caseSeed()));
+}
+
+TEST_F(BrdfEvaluate, RoughStaysInsideTheBound) {
+  expectInsideTheBound(rough(generated("elementsPerDomain"), caseSeed()));
+}
+
+TEST_F(BrdfEvaluate, BadInputCountsAsTheContractSays) { expectInsideTheBound(degenerate()); }
+
+TEST_F(BrdfEvaluate, EverySizeAroundAGroupIsWrittenExactly) {
+  for (const std::size_t n : {0u, 1u, kGroupSize - 1, kGroupSize, kGroupSize + 1, 3 * kGroupSize})
+    expectInsideTheBound(bulk(n, caseSeed() + n));
+}
+
+TEST_F(BrdfEvaluate, EveryResultIsFiniteAndInRange) {
+  std::vector<Sample> samples = degenerate();
+  const std::vector<Sample> more = grazing(generated("elementsPerDomain"), caseSeed());
+  samples.insert(samples.end(), more.begin(), more.end());
+  const std::vector<Shaded> results = shade(samples);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const float* scalars = reinterpret_cast<const float*>(&results[i]);
+    for (std::size_t s = 0; s < sizeof(Shaded) / sizeof(float); ++s)
+      ASSERT_TRUE(std::isfinite(scalars[s]) && scalars[s] >= 0)
+          << "scalar " << s << " is " << scalars[s] << " for\n" << describe(samples[i]);
+    ASSERT_LE(results[i].G, 1) << describe(samples[i]);
+  }
+}
+
+// f(l, v) = f(v, l): Walter et al. 2007, sec. 2. The clamp of NoV at kMinNoV is not symmetric, so
+// pairs where either cosine is within it, or where rounding could put it there, say nothing.
+TEST_F(BrdfEvaluate, SwappingViewAndLightChangesNothing) {
+  std::vector<Sample> forward;
+  for (const Sample& s : bulk(generated("elementsPerDomain"), caseSeed())) {
+    const glm::dvec3 n = glm::normalize(glm::dvec3(s.normal));
+    const auto cosine = [&](const vec3& v) { return glm::dot(n, glm::normalize(glm::dvec3(v))); };
+    if (std::min(cosine(s.view), cosine(s.light)) > 2 * kMinNoV) forward.push_back(s);
+  }
+  ASSERT_FALSE(forward.empty());
+  std::vector<Sample> backward = forward;
+  for (Sample& s : backward) std::swap(s.view, s.light);
+  const std::vector<Shaded> there = shade(forward), back = shade(backward);
+  const UseRules scope(Session::current().bounds().spec);
+  for (std::size_t i = 0; i < there.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      const auto allowed = explore([&] { return evaluate<Bounded>(forward[i]); });
+      const Bounded sum = allowed.specular[c] + allowed.diffuse[c];
+      const double a = double{there[i].specular[c]} + there[i].diffuse[c];
+      const double b = double{back[i].specular[c]} + back[i].diffuse[c];
+      // Each side has the whole interval to itself: both may err by its width, apart.
+      ASSERT_LE(std::abs(a - b), 2 * (sum.hi - sum.lo)) << describe(forward[i]);
+    }
+}
+
+// Lengths are scaled by powers of two, which is exact, so the model's interval is that of the
+// unscaled vectors; inversesqrt need not scale to the bit on a conforming device.
+TEST_F(BrdfEvaluate, TheLengthOfAVectorDoesNotMatter) {
+  const std::vector<Sample> samples = bulk(generated("elementsPerDomain"), caseSeed());
+  std::vector<Sample> scaled = samples;
+  for (Sample& s : scaled) {
+    s.normal *= 4;
+    s.view *= 0.25f;
+    s.light *= 16;
+  }
+  const std::vector<Shaded> results = shade(scaled);
+  const UseRules scope(Session::current().bounds().spec);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const auto allowed = explore([&] { return evaluate<Bounded>(samples[i]); });
+    ASSERT_LE(budgetUsed(results[i].D, allowed.D, false), 1) << describe(samples[i]);
+    ASSERT_LE(budgetUsed(results[i].radiance.x, allowed.radiance.x, false), 1)
+        << describe(samples[i]);
+  }
+}
+
+TEST_F(BrdfEvaluate, AMetalHasNoDiffuse) {
+  std::vector<Sample> samples = bulk(generated("elementsPerDomain"), caseSeed());
+  for (Sample& s : samples) s.metallic = 1;
+  for (const Shaded& o : shade(samples)) ASSERT_EQ(o.diffuse, vec3(0));
+}
+
+// F falls from 1 to F0 as VoH rises from 0 to 1. The light walks away from the view in steps wide
+// enough that (1 - VoH)^5 moves by more than its rounding.
+TEST_F(BrdfEvaluate, FresnelRisesAsTheHalfAngleOpens) {
+  constexpr int kSteps = 256;
+  std::vector<Sample> samples;
+  for (int i = 0; i <= kSteps; ++i) {
+    // To 89.65 degrees: at 90 the light is opposite to the view.
+    const double angle = std::numbers::pi / 2 * (0.25 + 0.7461 * i / kSteps);
+    samples.push_back({.normal = {0, 0, 1},
+                       .roughness = 0.5f,
+                       .view = vec3(std::sin(angle), 0, std::cos(angle)),
+                       .metallic = 0,
+                       .light = vec3(-std::sin(angle), 0, std::cos(angle)),
+                       .albedo = vec3(0.5f),
+                       .irradiance = vec3(1)});
+  }
+  const std::vector<Shaded> results = shade(samples);
+  for (std::size_t i = 1; i < results.size(); ++i) ASSERT_GT(results[i].F.x, results[i - 1].F.x);
+}
+
+// Directional albedo of the specular lobe at alpha = 1, NoV = 1, F = 1 by quadrature over light
+// directions, against the closed form: D = 1/pi, G1(x) = 2x/(1+x), so E = int mu/(1+mu) = 1 - ln 2.
+TEST_F(BrdfEvaluate, SpecularAlbedoOfARoughMirrorSeenHeadOnIsOneMinusLogTwo) {
+  const truth::GaussLegendre rule(64);
+  std::vector<Sample> samples;
+  for (const double node : rule.nodes) {
+    const double mu = (node + 1) / 2;
+    samples.push_back({.normal = {0, 0, 1},
+                       .roughness = 1,
+                       .view = {0, 0, 1},
+                       .metallic = 1,
+                       .light = vec3(std::sqrt(1 - mu * mu), 0, mu),
+                       .albedo = vec3(1),
+                       .irradiance = vec3(1)});
+  }
+  const std::vector<Shaded> results = shade(samples);
+  const UseRules scope(Session::current().bounds().spec);
+  double albedo = 0, slack = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const double weight = 2 * std::numbers::pi * rule.weights[i] / 2;
+    albedo += weight * results[i].radiance.x;
+    const auto allowed = explore([&] { return evaluate<Bounded>(samples[i]); });
+    slack += weight * (allowed.radiance.x.hi - allowed.radiance.x.lo);
+    // The light's direction itself is rounded to float, and the integrand has slope at most 1.
+    slack += weight * std::numeric_limits<float>::epsilon();
+  }
+  EXPECT_LE(std::abs(albedo - (1 - std::numbers::ln2)), slack);
+}
+
+}  // namespace
+}  // namespace gnomon::brdf
