@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <ostream>
 #include <random>
 
 #include <fmt/format.h>
@@ -355,6 +356,8 @@ std::string_view nameOf(Class c) {
   return c == Class::kConforms ? "conforms" : c == Class::kEquivalent ? "equivalent" : "wrong";
 }
 
+void PrintTo(Class c, std::ostream* out) { *out << nameOf(c); }
+
 Bounds Bounds::specification(bool roundingRte) {
   const Rules either = Rules::specification();
   return {.spec = roundingRte ? Rules::specification(Rounding::nearestEven) : either,
@@ -372,10 +375,9 @@ double budgetUsed(double got, const Bounded& allowed, bool signOfZero) {
   if (std::isnan(got)) return allowed.mayBeNan() ? 0 : kInfinity;
   if (allowed.unspecified()) return 0;
   const double x = centre(allowed);
-  if (got == x) {
-    const bool zeroMatters = signOfZero && got == 0 && allowed.lo == allowed.hi;
-    return zeroMatters && std::signbit(got) != std::signbit(allowed.value) ? kInfinity : 0;
-  }
+  const bool zeroMatters = signOfZero && got == 0 && allowed.value == 0;
+  if (zeroMatters && std::signbit(got) != std::signbit(allowed.value)) return kInfinity;
+  if (got == x) return 0;
   const double room = got > x ? allowed.hi - x : x - allowed.lo;
   if (!std::isfinite(got)) return room == kInfinity || got == (got > x ? allowed.hi : allowed.lo) ? 1 : kInfinity;
   return room > 0 ? std::abs(got - x) / room : kInfinity;

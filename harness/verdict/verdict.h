@@ -17,6 +17,7 @@ namespace gnomon {
 
 enum class Class { kConforms, kEquivalent, kWrong };
 std::string_view nameOf(Class c);
+void PrintTo(Class c, std::ostream* out);  // GoogleTest's hook
 
 /// What the outputs must be, for every element; scalars in the order of the contract's fields.
 struct Expectation {

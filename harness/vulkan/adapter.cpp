@@ -122,8 +122,8 @@ std::optional<Queue> computeQueue(VkPhysicalDevice device) {
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
-  for (const VkQueueFlags wanted :
-       {VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT, VK_QUEUE_COMPUTE_BIT | 0})
+  constexpr VkQueueFlags kCompute = VK_QUEUE_COMPUTE_BIT;
+  for (const VkQueueFlags wanted : {kCompute | VK_QUEUE_GRAPHICS_BIT, kCompute})
     for (std::uint32_t i = 0; i < count; ++i)
       if ((families[i].queueFlags & wanted) == wanted)
         return Queue{i, families[i].timestampValidBits};

@@ -183,15 +183,15 @@ inline Bounded min(const Bounded& a, const Bounded& b) noexcept {
   const Flags flags = a.flags | b.flags;
   if ((flags & kMayBeNan) != 0) [[unlikely]]
     return detail::minMayBeNan(a, b);
-  return detail::make(b.value < a.value ? b.value : a.value, least(a.lo, b.lo),
-                      least(a.hi, b.hi), flags);
+  return detail::make(b.value < a.value ? b.value : a.value, least(a.lo, b.lo), least(a.hi, b.hi),
+                      flags);
 }
 inline Bounded max(const Bounded& a, const Bounded& b) noexcept {
   const Flags flags = a.flags | b.flags;
   if ((flags & kMayBeNan) != 0) [[unlikely]]
     return detail::maxMayBeNan(a, b);
-  return detail::make(a.value < b.value ? b.value : a.value, most(a.lo, b.lo),
-                      most(a.hi, b.hi), flags);
+  return detail::make(a.value < b.value ? b.value : a.value, most(a.lo, b.lo), most(a.hi, b.hi),
+                      flags);
 }
 // FAbs: "correct result".
 inline Bounded abs(const Bounded& a) noexcept {

@@ -101,7 +101,7 @@ Bounded mix(const Bounded& x, const Bounded& y, const Bounded& a) noexcept {
 
 // t = (x - e0) / (e1 - e0) may be evaluated as x / d - e0 / d: three roundings and a division for
 // each of |x| / d and |e0| / d. Then h(t) = 3 t^2 - 2 t^3, whose slope is 6 t (1 - t), in at most
-// five roundings of its two terms; h is exact where clamp yields exactly 0 or 1.
+// three roundings of either term, since 2 t is exact; h is exact where clamp yields 0 or 1.
 Bounded smoothstep(const Bounded& edge0, const Bounded& edge1, const Bounded& x) noexcept {
   const double value = smoothstep(edge0.value, edge1.value, x.value);
   const Flags flags = edge0.flags | edge1.flags | x.flags;
@@ -110,24 +110,25 @@ Bounded smoothstep(const Bounded& edge0, const Bounded& edge1, const Bounded& x)
   if ((flags & kMayBeNan) || !bounded || !(least >= kMinNormal && most <= 0x1p126))
     return unspecified(Operation::smoothstep, value, flags);
 
-  const double largest =
-      std::max({std::abs(x.lo), std::abs(x.hi), std::abs(edge0.lo), std::abs(edge0.hi)});
-  const double divide = rules().error(Operation::divide, 0, 0).ulp * 0x1p-23;
+  const auto size = [](const Bounded& b) { return std::max(std::abs(b.lo), std::abs(b.hi)); };
+  const double divide = detail::relativeError(Operation::divide);
+  const double roundings3 = rules().gamma(3);
   const double error =
-      (rules().gamma(4) + divide * (1 + rules().gamma(4))) * 2 * largest / least + 4 * kMinNormal;
+      (roundings3 + divide * (1 + roundings3)) * (size(x) + size(edge0)) / least * (1 + 0x1p-20) +
+      4 * kMinNormal;
   // t falls with edge0 at x < edge1 and rises above, but only inside [0, 1] does it matter.
   const auto t = [&](double at, double e0, double e1, double slack) {
     return std::clamp((at - e0) / (e1 - e0) + slack, 0.0, 1.0);
   };
   const double tLo = t(x.lo, edge0.hi, edge1.hi, -error), tHi = t(x.hi, edge0.lo, edge1.lo, error);
   if (tLo == tHi) return detail::make(value, tLo, tLo, flags);
-  const double steepest = std::clamp(0.5, tLo, tHi);
-  const double slope = 6 * steepest * (1 - steepest);
   const auto h = [](double at) { return at * at * (3 - 2 * at); };
-  const double roundings = rules().gamma(5) * (3 + 2 * tHi) * tHi * tHi;
+  const double steepest = std::clamp(0.5, tLo, tHi);
+  const double moved = std::min(6 * steepest * (1 - steepest) * error, h(tHi) - h(tLo));
+  const double rounded = roundings3 * (3 + 2 * tHi) * tHi * tHi;
   const double exactLo = t(x.lo, edge0.hi, edge1.hi, 0), exactHi = t(x.hi, edge0.lo, edge1.lo, 0);
-  return detail::around(value, {h(exactLo), h(exactHi)}, 0,
-                        slope * error + roundings + 4 * kMinNormal, flags);
+  return detail::around(value, {h(exactLo), h(exactHi)}, 0, moved + rounded + 4 * kMinNormal,
+                        flags);
 }
 
 Decision isFinite(const Bounded& x) noexcept {

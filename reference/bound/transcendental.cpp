@@ -52,21 +52,23 @@ Range log2Range(const Bounded& x) {
   return {lo, hi, lo == hi && std::floor(lo) == lo && std::exp2(lo) == x.lo};
 }
 
-// Worst error of c = sqrt(1 - x x) for |x| <= 1, c >= cosine. x x and the difference are rounded
-// once each, which moves c^2 by at most u and c by min(sqrt(u), u / c); then the error of sqrt.
-// 1 - x x is never negative, since x x <= 1 survives rounding.
+// Worst error of c = sqrt(1 - x x), given the least c. x x and the difference are rounded once each
+// below 1, where floats are u / 2 (to nearest: u) apart: c^2 moves by at most u, and c most where
+// it is least and shrinks, by c - sqrt(c^2 - u) = u / (c + sqrt(c^2 - u)), or by sqrt(u) if that is
+// all of it. It is never the root of a negative, since x x <= 1 survives rounding. Then sqrt errs.
 double complementError(double cosine) {
-  const double u = rules().unitRoundoff();
-  const double moved = cosine > 0 ? std::min(std::sqrt(u), u / cosine) : std::sqrt(u);
-  return moved * (1 + kUlp) + sqrtError() * (1 + moved);
+  const double u = rules().unitRoundoff(), square = cosine * cosine;
+  const double moved = square > u ? u / (cosine + std::sqrt(square - u)) : std::sqrt(u);
+  return moved * (1 + 0x1p-20) + sqrtError() * (1 + moved);
 }
 
-// An angle whose sine or cosine errs by `complement`: on the unit circle the angle moves as much
-// (times |x| <= 1; the factor covers the second order), then atan2's own error.
-Bounded inheritedAngle(double value, Range angle, double complement, Flags flags) {
-  const double moved = 2 * complement;
+// The angle at (x, c) when c errs by d: tan of the difference is x d / (x^2 + c (c - d)), at most
+// 4/3 |x| d, since x^2 + c^2 = 1 and d is either tiny or c^2 < 1/4. Then atan2's own error.
+Bounded inheritedAngle(const Bounded& x, double value, Range angle, double complement) {
+  const double moved = complement * std::max(std::abs(x.lo), std::abs(x.hi)) * 4 / 3;
   const double largest = std::max(std::abs(angle.lo), std::abs(angle.hi)) + moved;
-  return detail::around(value, angle, 0, moved + relativeError(Operation::atan2) * largest, flags);
+  const double error = moved + relativeError(Operation::atan2) * largest + 2 * kMinNormal;
+  return detail::around(value, angle, 0, error, x.flags);
 }
 
 }  // namespace
@@ -188,7 +190,7 @@ Bounded asin(const Bounded& x) noexcept {
   const Range angle{std::asin(x.lo), std::asin(x.hi)};
   if (const auto known = measured(Operation::asin, value, angle, x.flags)) return *known;
   const double cosine = std::min(std::cos(angle.lo), std::cos(angle.hi));
-  return inheritedAngle(value, angle, complementError(cosine), x.flags);
+  return inheritedAngle(x, value, angle, complementError(cosine));
 }
 
 Bounded acos(const Bounded& x) noexcept {
@@ -198,7 +200,7 @@ Bounded acos(const Bounded& x) noexcept {
   const Range angle{std::acos(x.hi), std::acos(x.lo)};
   if (const auto known = measured(Operation::acos, value, angle, x.flags)) return *known;
   const double sine = std::min(std::sin(angle.lo), std::sin(angle.hi));
-  return inheritedAngle(value, angle, complementError(sine), x.flags);
+  return inheritedAngle(x, value, angle, complementError(sine));
 }
 
 Bounded atan(const Bounded& x) noexcept {

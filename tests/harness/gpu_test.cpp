@@ -195,7 +195,7 @@ TEST_P(GpuTest, PoolsGrowWithTheRunAndAreReused) {
   Dispatch dispatch;
   dispatch.program = &program;
   dispatch.buffers = {{kFirst, &counters}};
-  for (const std::size_t count : {1, 70, 2, 71}) {
+  for (const std::size_t count : {1u, 70u, 2u, 71u}) {
     const std::vector<Dispatch> some(count, dispatch);
     gpu->run(some, kLimit);
   }

