@@ -22,10 +22,21 @@ Observation KernelCase::run(Stimulus stimulus) {
 }
 
 void KernelCase::expectConforms(const Observation& seen, const Expectation& expected) {
+  expectWithin(Session::current().bounds(), seen, expected);
+}
+
+void KernelCase::expectWithinSpecification(const Observation& seen, const Expectation& expected) {
+  Bounds bounds = Session::current().bounds();
+  bounds.device.reset();
+  expectWithin(bounds, seen, expected);
+}
+
+void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
+                              const Expectation& expected) {
   Session& session = Session::current();
   const Subject& subject = session.subject(kernelName);
   const Struct& layout = subject.record().buffer(expected.buffer).element;
-  Verdict verdict = judge(layout, seen, expected, session.bounds(), session.policy(), caseSeed());
+  Verdict verdict = judge(layout, seen, expected, bounds, session.policy(), caseSeed());
   checked(verdict.elements);
   if (!verdict.ok() || verdict.outsideDevice > 0 || verdict.verdict != Class::kConforms)
     ADD_FAILURE() << subject.origin() << " is " << nameOf(verdict.verdict) << "\n"

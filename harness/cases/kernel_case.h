@@ -33,10 +33,16 @@ class KernelCase : public testing::Test {
   /// wrong, or outside the device's measured errors, fails the case with an explanation.
   void expectConforms(const Observation& seen, const Expectation& expected);
 
+  /// The same under the specification alone, for the stage that measures the device.
+  void expectWithinSpecification(const Observation& seen, const Expectation& expected);
+
   /// Elements that a law was checked on, for the tally.
   void checked(std::size_t elements) { Session::current().currentCase().elements += elements; }
 
   const std::string kernelName;
+
+ private:
+  void expectWithin(const Bounds& bounds, const Observation& seen, const Expectation& expected);
 };
 
 /// A seed of its own for every case, from the run's seed and the case's name.

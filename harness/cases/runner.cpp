@@ -127,14 +127,18 @@ std::vector<CaseName> selectCases(const Selection& selection) {
 }
 
 void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer) {
-  std::vector<std::string> names;
-  for (const CaseName& c : cases) names.push_back(c.name);
-  testing::GTEST_FLAG(filter) = names.empty() ? "-*" : fmt::format("{}", fmt::join(names, ":"));
   testing::TestEventListeners& listeners = testing::UnitTest::GetInstance()->listeners();
   delete listeners.Release(listeners.default_result_printer());
   listeners.Append(new Listener(session, cases, observer));
-  // The records say more than GoogleTest's own status.
-  [[maybe_unused]] const int status = RUN_ALL_TESTS();
+  // GoogleTest runs suites as the linker ordered them; ours build on each other, so kernel by kernel.
+  for (std::size_t begin = 0, end = 0; begin < cases.size(); begin = end) {
+    std::vector<std::string> names;
+    for (; end < cases.size() && cases[end].kernel == cases[begin].kernel; ++end)
+      names.push_back(cases[end].name);
+    testing::GTEST_FLAG(filter) = fmt::format("{}", fmt::join(names, ":"));
+    // The records say more than GoogleTest's own status.
+    [[maybe_unused]] const int status = RUN_ALL_TESTS();
+  }
 }
 
 }  // namespace gnomon

@@ -64,8 +64,18 @@ SpirvWords Session::load(const std::filesystem::path& file, const KernelRecord& 
 }
 
 const Bounds& Session::bounds() {
-  if (!rules) rules = Bounds::specification(gpu().info().roundingRteFloat32);
+  if (!rules) {
+    rules = Bounds::specification(gpu().info().roundingRteFloat32);
+    DeviceErrors known = loadDeviceErrors(gpu().info(), settings.root).value_or(DeviceErrors{});
+    for (const auto& [operation, error] : errors) known[operation] = error;
+    if (!known.empty()) rules->device = deviceRules(rules->spec, known);
+  }
   return *rules;
+}
+
+void Session::measured(Operation operation, const MeasuredError& error) {
+  errors[operation] = error;
+  rules.reset();
 }
 
 std::chrono::milliseconds Session::limit() const {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/cases/device_rules.h"
 #include "harness/hygiene/subject.h"
 #include "harness/verdict/policy.h"
 #include "harness/verdict/verdict.h"
@@ -59,6 +60,11 @@ class Session {
   /// The rules of this device: what the specification allows, and what was measured if it was.
   const Bounds& bounds();
 
+  /// Takes in what a case has measured; from now on part of bounds().
+  void measured(Operation operation, const MeasuredError& error);
+  /// What this run has measured so far.
+  const DeviceErrors& measurements() const { return errors; }
+
   /// Time limit of one wait for the device.
   std::chrono::milliseconds limit() const;
 
@@ -73,6 +79,7 @@ class Session {
   Policy choices;
   std::unique_ptr<Gpu> device;
   std::optional<Bounds> rules;
+  DeviceErrors errors;
   std::map<std::string, std::unique_ptr<Subject>> subjects;
   std::vector<CaseRecord> records;
 };

@@ -42,11 +42,13 @@ Observer observerFor(Terminal& terminal, const SessionOptions& options) {
               }};
 }
 
-void writeCaseFiles(const std::filesystem::path& folder, const std::vector<CaseRecord>& records) {
+/// What each case found, and the device's measured errors where this run measured them.
+void writeFindings(const std::filesystem::path& folder, const Session& session,
+                   const GpuInfo& gpu) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw UsageError(fmt::format("--out {}: {}", folder.string(), error.message()));
-  for (const CaseRecord& r : records) {
+  for (const CaseRecord& r : session.cases()) {
     std::string text = fmt::format("{} ({}): {}\n", r.name, r.kernel, r.failed ? "failed" : "passed");
     for (const Verdict& v : r.verdicts)
       for (const FieldVerdict& f : v.fields)
@@ -56,6 +58,8 @@ void writeCaseFiles(const std::filesystem::path& folder, const std::vector<CaseR
     for (const std::string& m : r.messages) text += "\n" + m;
     writeText(folder / (r.name + ".txt"), text);
   }
+  if (!session.measurements().empty())
+    writeText(folder / (deviceKey(gpu) + ".json"), deviceErrorsJson(gpu, session.measurements()));
 }
 
 int status(const std::vector<KernelSummary>& kernels, bool require) {
@@ -82,7 +86,9 @@ int validate(const ValidateOptions& given) {
   runCases(session, cases, observerFor(terminal, options.session));
 
   const std::vector<KernelSummary> kernels = summarise(session.cases());
-  if (!options.out.empty()) writeCaseFiles(options.out, session.cases());
+  if (!options.out.empty()) writeFindings(options.out, session, gpu);
+  if (!session.measurements().empty() && !options.session.cases)
+    cacheDeviceErrors(gpu, session.measurements());
   if (!options.junit.empty()) writeText(options.junit, summaryJunit(kernels));
   if (!options.json.empty()) writeText(options.json, summaryJson(kernels, session, gpu));
   terminal.print(summaryTable(kernels, terminal));

@@ -148,6 +148,11 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
         module, differing, out.spec->name, where(out, firstDiffering)));
 }
 
+Bytes elementsIn(const Output& out, const Bytes& whole) {
+  const auto begin = whole.begin() + static_cast<std::ptrdiff_t>(out.before);
+  return {begin, begin + static_cast<std::ptrdiff_t>(out.dataBytes())};
+}
+
 /// Both runs of one module; returns the elements of the first.
 std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
                                            const GpuProgram& program, const Stimulus& stimulus,
@@ -164,7 +169,7 @@ std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
       return std::span<const std::byte>(runs[i][o]).subspan(out.before, out.dataBytes());
     };
     checkWords(findings, out, elements(0), elements(1), subject.record().deterministic, module);
-    data[out.spec->name].assign(elements(0).begin(), elements(0).end());
+    data[out.spec->name] = elementsIn(out, runs[0][o]);
   }
   return data;
 }
@@ -181,6 +186,16 @@ Observation observe(const Subject& subject, const Stimulus& stimulus) {
   for (const std::string& message : subject.gpu().takeMessages())
     seen.findings.push_back("validation layer: " + message);
   return seen;
+}
+
+std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus) {
+  Setup setup = prepare(subject, stimulus);
+  const std::vector<Bytes> whole =
+      runOnce(subject, setup, subject.twin(), kPoison[0], stimulus.limit, nullptr);
+  std::map<std::string, Bytes> data;
+  for (std::size_t o = 0; o < whole.size(); ++o)
+    data[setup.outputs[o].spec->name] = elementsIn(setup.outputs[o], whole[o]);
+  return data;
 }
 
 }  // namespace gnomon

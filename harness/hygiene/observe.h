@@ -49,4 +49,9 @@ struct Observation {
 /// deterministic, validation messages. Throws GpuError when the device is lost or the limit passes.
 Observation observe(const Subject& subject, const Stimulus& stimulus);
 
+/// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so
+/// many that checking each would take hours. What is measured so has to be observed on a part first.
+std::map<std::string, std::vector<std::byte>> runTwinOnce(const Subject& subject,
+                                                          const Stimulus& stimulus);
+
 }  // namespace gnomon

@@ -21,6 +21,7 @@ ProgramDescription description(const KernelRecord& record, SpirvWords module) {
   ProgramDescription d{.spirv = std::move(module)};
   for (const BufferSpec& b : record.buffers) d.slots.push_back({.set = 0, .binding = b.binding});
   d.pushBytes = record.push.size;
+  d.specialization = record.specialization;
   return d;
 }
 

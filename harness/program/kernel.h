@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -93,6 +94,7 @@ struct KernelRecord {
   /// Groups for a number of items.
   std::function<std::array<std::uint32_t, 3>(std::size_t items)> grid;
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
+  std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
   bool deterministic = true;          ///< two runs on the same input agree to the bit
   std::string summary{};                ///< one line for `gnomon list kernels`
 

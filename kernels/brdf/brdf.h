@@ -8,22 +8,21 @@
 GNOMON_CONTRACT(brdf)
 
 // What is evaluated. Bad input is part of the contract: a component that is NaN or infinite counts
-// as 0; ranges are enforced by clamping; a vector whose largest component is not within
-// [kShortestVector, kLongestVector] counts as the zero vector, and a zero vector makes every output 0.
-// So does a light so nearly opposite to the view that no component of v + l reaches kShortestHalf:
-// the half vector's direction would be rounding noise.
+// as 0, ranges are enforced by clamping, and a vector counts as zero if it is too short to be a unit
+// vector (kShortestUnit). A zero vector makes every output 0; so does a light so nearly opposite to
+// the view that the half vector would be rounding noise (kShortestHalf).
 struct Sample {
-  vec3 normal;      // n, any length
+  vec3 normal;      // n, unit; components clamped to [-1, 1]
   float roughness;  // perceptual r, clamped to [kMinRoughness, 1]
-  vec3 view;        // v, towards the eye, any length
+  vec3 view;        // v, towards the eye, unit; clamped likewise
   float metallic;   // clamped to [0, 1]
-  vec3 light;       // l, towards the light, any length
+  vec3 light;       // l, towards the light, unit; clamped likewise
   vec3 albedo;      // base colour, clamped to [0, 1]
   vec3 irradiance;  // of the light at normal incidence, W/m^2, clamped to [0, kMaxIrradiance]
 };
 
 struct Shaded {
-  float D;          // GGX normal distribution, 1/sr
+  float D;          // GGX normal distribution, 1/sr; mirrored where NoH < 0
   float G;          // Smith shadowing-masking, Schlick-GGX with k for direct light, [0, 1]
   vec3 F;           // Schlick reflectance at VoH, [0, 1]
   vec3 ambientF;    // Schlick reflectance at NoV, limited by 1 - r, [0, 1]
@@ -41,9 +40,8 @@ const float kMinNoV = 1e-4f;
 const float kMinDenominator = 1e-4f;
 const float kDielectricF0 = 0.04f;
 const float kMaxIrradiance = 1e6f;
-const float kShortestVector = 8.8817841970012523e-16f;  // 2^-50
-const float kLongestVector = 1125899906842624.0f;       // 2^50
-const float kShortestHalf = 1.52587890625e-5f;          // 2^-16
+const float kShortestUnit = 0.5f;             // largest component; a unit vector has 0.577
+const float kShortestHalf = 1.52587890625e-5f;  // largest component of v + l, 2^-16
 
 const uint kSamples = 0;  // binding numbers, set 0
 const uint kResults = 1;

@@ -11,18 +11,21 @@ layout(push_constant, scalar) uniform Push { Evaluate push; };
 layout(set = 0, binding = kSamples, scalar) readonly buffer Samples { Sample samples[]; };
 layout(set = 0, binding = kResults, scalar) writeonly buffer Results { Shaded results[]; };
 
+vec3 unitOrZero(vec3 v) {
+  const vec3 u = clamp(finiteOrZero(v), -1.0, 1.0);
+  return largestComponent(u) >= kShortestUnit ? u : vec3(0.0);
+}
+
 bool isZero(vec3 v) { return v == vec3(0.0); }
 
-vec3 direction(vec3 v) { return unitOrZero(finiteOrZero(v), kShortestVector, kLongestVector); }
-
-float cosine(vec3 a, vec3 b) { return clamp(dot(a, b), 0.0, 1.0); }
+float cosine(float x) { return clamp(x, 0.0, 1.0); }
 
 Shaded evaluate(Sample s) {
-  const vec3 n = direction(s.normal);
-  const vec3 v = direction(s.view);
-  const vec3 l = direction(s.light);
-  const vec3 h = unitOrZero(v + l, kShortestHalf, kLongestVector);
-  if (isZero(n) || isZero(v) || isZero(l) || isZero(h)) {
+  const vec3 n = unitOrZero(s.normal);
+  const vec3 v = unitOrZero(s.view);
+  const vec3 l = unitOrZero(s.light);
+  const vec3 halfway = v + l;
+  if (isZero(n) || isZero(v) || isZero(l) || largestComponent(halfway) < kShortestHalf) {
     const vec3 zero = vec3(0.0);
     return Shaded(0.0, 0.0, zero, zero, zero, zero, zero);
   }
@@ -32,14 +35,16 @@ Shaded evaluate(Sample s) {
   const vec3 albedo = clamp(finiteOrZero(s.albedo), 0.0, 1.0);
   const vec3 irradiance = clamp(finiteOrZero(s.irradiance), 0.0, kMaxIrradiance);
 
-  const float NoV = max(cosine(n, v), kMinNoV);
-  const float NoL = cosine(n, l);
-  const float NoH = cosine(n, h);
-  const float VoH = cosine(v, h);
+  // Scaled last: the rounding of h would be as large as n x h inside a narrow lobe.
+  const float scale = inversesqrt(dot(halfway, halfway));
+  const vec3 nxh = cross(n, halfway) * scale;
+  const float NoV = max(cosine(dot(n, v)), kMinNoV);
+  const float NoL = cosine(dot(n, l));
+  const float VoH = cosine(dot(v, halfway) * scale);
   const vec3 F0 = mix(vec3(kDielectricF0), albedo, metallic);
 
   Shaded o;
-  o.D = D_GGX(n, h, NoH, r * r);
+  o.D = D_GGX(nxh, dot(n, halfway) * scale, r * r);
   o.G = G_SchlickDirect(NoV, NoL, r);
   o.F = F_Schlick(VoH, F0);
   o.ambientF = F_SchlickRoughness(NoV, F0, r);

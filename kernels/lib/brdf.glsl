@@ -4,12 +4,11 @@
 
 const float kPi = 3.14159265358979;
 
-// GGX. Walter et al. 2007, eq. 33. The denominator NoH^2 (a^2 - 1) + 1 cancels inside the lobe;
-// sin^2 + NoH^2 a^2 with sin^2 = |n x h|^2 does not.
-float D_GGX(vec3 n, vec3 h, float NoH, float a) {
-  const vec3 sine = cross(n, h);
+// GGX. Walter et al. 2007, eq. 33, of the sine and cosine of the angle between n and h. The usual
+// denominator NoH^2 (a^2 - 1) + 1 cancels inside the lobe; with sin^2 = |n x h|^2 this one does not.
+float D_GGX(vec3 nxh, float NoH, float a) {
   const float a2 = a * a;
-  const float d = dot(sine, sine) + NoH * NoH * a2;
+  const float d = dot(nxh, nxh) + NoH * NoH * a2;
   return a2 / (kPi * d * d);
 }
 

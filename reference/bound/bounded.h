@@ -26,6 +26,9 @@
 
 namespace gnomon {
 
+template <class I>
+concept Integer = std::integral<I> && !std::same_as<I, bool>;
+
 struct Bounded {
   double value = 0;
   double lo = 0, hi = 0;
@@ -40,9 +43,8 @@ struct Bounded {
     if (flags != 0) lo = -kInfinity, hi = kInfinity;
   }
   // OpConvertSToF, OpConvertUToF: rounded like + - *.
-  template <std::integral I>
-  requires(!std::same_as<I, bool>) Bounded(I x)
-  noexcept;
+  template <Integer I>
+  Bounded(I x) noexcept;
   // A real literal is a float in the shader: 0.1f, not 0.1.
   Bounded(double) = delete;
   Bounded(bool) = delete;
@@ -148,9 +150,8 @@ inline Bounded& operator-=(Bounded& a, const Bounded& b) noexcept { return a = a
 inline Bounded& operator*=(Bounded& a, const Bounded& b) noexcept { return a = a * b; }
 inline Bounded& operator/=(Bounded& a, const Bounded& b) noexcept { return a = a / b; }
 
-template <std::integral I>
-requires(!std::same_as<I, bool>) Bounded::Bounded(I x)
-noexcept {
+template <Integer I>
+Bounded::Bounded(I x) noexcept {
   const Exact exact{static_cast<double>(x), 0};
   assert(std::abs(exact.head) <= 0x1p53 && "exact in double, as every integer of a shader is");
   *this = detail::rounded(exact.head, exact, exact, 0);
@@ -172,8 +173,8 @@ inline Decision operator>=(const Bounded& a, const Bounded& b) noexcept { return
 inline Decision operator==(const Bounded& a, const Bounded& b) noexcept {
   const Flags flags = a.flags | b.flags;
   const bool open = (flags & kMayBeNan) != 0;
-  const bool samePoint = (a.lo == a.hi) & (b.lo == b.hi) & (a.lo == b.lo);
-  return Decision(open || ((a.lo <= b.hi) & (b.lo <= a.hi)), open || !samePoint, a.value == b.value,
+  const bool samePoint = a.lo == a.hi && b.lo == b.hi && a.lo == b.lo;
+  return Decision(open || ((a.lo <= b.hi && b.lo <= a.hi)), open || !samePoint, a.value == b.value,
                   flags);
 }
 inline Decision operator!=(const Bounded& a, const Bounded& b) noexcept { return !(a == b); }
@@ -206,7 +207,7 @@ inline Bounded select(bool condition, const Bounded& a, const Bounded& b) noexce
 inline Bounded select(const Decision& condition, const Bounded& a, const Bounded& b) noexcept {
   if (!condition.undecided()) return condition.canBeTrue ? a : b;
   Bounded result = condition.value ? join(a, b) : join(b, a);
-  result.flags |= condition.flags;
+  result.flags |= condition.flags & kFromConditions;
   return result;
 }
 

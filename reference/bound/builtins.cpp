@@ -127,8 +127,9 @@ Bounded smoothstep(const Bounded& edge0, const Bounded& edge1, const Bounded& x)
   const double moved = std::min(6 * steepest * (1 - steepest) * error, h(tHi) - h(tLo));
   const double rounded = roundings3 * (3 + 2 * tHi) * tHi * tHi;
   const double exactLo = t(x.lo, edge0.hi, edge1.hi, 0), exactHi = t(x.hi, edge0.lo, edge1.lo, 0);
-  return detail::around(value, {h(exactLo), h(exactHi)}, 0, moved + rounded + 4 * kMinNormal,
-                        flags);
+  const Bounded result =
+      detail::around(value, {h(exactLo), h(exactHi)}, 0, moved + rounded + 4 * kMinNormal, flags);
+  return detail::clipped(result, 0, kInfinity);
 }
 
 Decision isFinite(const Bounded& x) noexcept {

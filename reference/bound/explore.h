@@ -28,7 +28,6 @@
 
 #include "reference/bound/bounded.h"
 #include "reference/bound/integer.h"
-#include "reference/bound/vec.h"
 
 namespace gnomon {
 
@@ -135,7 +134,7 @@ auto explore(const Model& model) {
   const bool overflowed = trail.overflowed();
   detail::forEachBound(result, [&](auto& bound) {
     if (overflowed) bound = withoutLimits(bound, kAmbiguous | kNotJudged);
-    bound.flags |= flags & (kMayBeNan | kUnspecified);
+    bound.flags |= flags & kFromConditions;
   });
   return result;
 }

@@ -26,6 +26,10 @@ constexpr Flags unspecifiedBy(Operation operation) {
 }
 inline constexpr Flags kUnspecified = (unspecifiedBy(Operation{kOperationCount}) - 1) & ~Flags{7};
 
+// What a result inherits from the values that a choice was made on: a comparison with NaN is open,
+// but yields no NaN.
+inline constexpr Flags kFromConditions = kUnspecified | kNotJudged;
+
 // The operations to blame, in the order of the enumeration.
 std::vector<Operation> unspecifiedOperations(Flags flags);
 

@@ -39,14 +39,14 @@ inline double most(double a, double b) noexcept { return a > b ? a : b; }
 
 // The largest float <= x, -infinity below all of them; written so that no branch is needed. The
 // conversion rounds to nearest, so only the float it yields and the one below come into question,
-// and head is so close that the difference is exact (Sterbenz). A zero that has to step down is -0,
-// since the conversion keeps the sign: its bits step to the negative denormal.
+// and it is so close to head that their difference is exact (Sterbenz). A zero that has to step
+// down is -0, since the conversion keeps the sign: its bits step to the negative denormal.
 inline double floorToFloat(Exact x) noexcept {
   const float nearest = static_cast<float>(x.head);
+  const bool tooHigh = nearest - x.head > x.tail;
   const auto bits = std::bit_cast<std::int32_t>(nearest);
-  const float below = std::bit_cast<float>(bits - (1 | (bits >> 31)));
-  const double high = nearest, low = below;
-  return high - x.head > x.tail ? low : high;
+  const std::int32_t down = -(1 | (bits >> 31)), mask = -static_cast<std::int32_t>(tooHigh);
+  return std::bit_cast<float>(bits + (down & mask));
 }
 inline double floorToFloat(double x) noexcept { return floorToFloat(Exact{x, 0}); }
 inline double ceilToFloat(Exact x) noexcept { return -floorToFloat(Exact{-x.head, -x.tail}); }
@@ -65,8 +65,8 @@ inline double spacing(double x) noexcept {
 // of two that is the distance *below* it, half the spacing above.
 inline double ulp(double x) noexcept {
   const bool powerOfTwo = (std::bit_cast<std::uint64_t>(x) << 12) == 0;
-  const bool halves = powerOfTwo & (std::abs(x) > kMinNormal) & (std::abs(x) <= kMaxFloat);
-  return halves ? spacing(x) / 2 : spacing(x);
+  if (powerOfTwo && std::abs(x) > kMinNormal && std::abs(x) <= kMaxFloat) return spacing(x) / 2;
+  return spacing(x);
 }
 
 // The floats next to the float x; the infinities are their own neighbours.

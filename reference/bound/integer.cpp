@@ -88,11 +88,13 @@ IntRange operator/(const IntRange& a, const IntRange& b) noexcept {
   return atCorners(a, b, [](std::int64_t x, std::int64_t y) { return x / y; });
 }
 
-// Between multiples of a single divisor the remainder only grows; else anything below it.
+// Below every divisor the number itself; between multiples of a single divisor the remainder only
+// grows; else anything below the largest divisor.
 IntRange operator%(const IntRange& a, const IntRange& b) noexcept {
   const Flags flags = a.flags | b.flags;
   if (a.lo < 0 || b.lo <= 0 || b.value == 0) return outside(0, Operation::integer, flags);
   const std::int64_t value = a.value % b.value;
+  if (a.hi < b.lo) return make(value, a.lo, a.hi, flags);
   if (b.isPoint() && a.lo / b.lo == a.hi / b.lo)
     return make(value, a.lo % b.lo, a.hi % b.lo, flags);
   return make(value, 0, std::min(a.hi, b.hi - 1), flags | kAmbiguous);
@@ -132,7 +134,7 @@ IntRange join(const IntRange& a, const IntRange& b) noexcept {
 IntRange select(const Decision& condition, const IntRange& a, const IntRange& b) noexcept {
   if (!condition.undecided()) return condition.canBeTrue ? a : b;
   IntRange result = condition.value ? join(a, b) : join(b, a);
-  result.flags |= condition.flags;
+  result.flags |= condition.flags & kFromConditions;
   return result;
 }
 

@@ -40,6 +40,16 @@ Rules Rules::specification(Rounding rounding) {
   return result;
 }
 
+void Rules::measure(Operation operation, Error error) {
+  constexpr Operation kParts[] = {Operation::divide, Operation::inverseSqrt, Operation::sqrt,
+                                  Operation::exp2, Operation::atan2};
+  if (error.absolute != 0 &&
+      std::find(std::begin(kParts), std::end(kParts), operation) != std::end(kParts))
+    throw std::invalid_argument("Rules::measure: the error of " + std::string(nameOf(operation)) +
+                                " has to be in ULP alone, because formulas use it as relative");
+  measured[static_cast<std::size_t>(operation)] = error;
+}
+
 Error Rules::error(Operation operation, double lo, double hi) const {
   if (const auto& known = measuredError(operation)) return *known;
   switch (operation) {

@@ -100,7 +100,8 @@ Bounded length(std::span<const Bounded> a) noexcept {
   const double relative = (1 + detail::sqrtError()) / std::sqrt(1 - rules().gamma(sum.count())) - 1;
   const double d = flushed(sum);
   const double absolute = 2 * (lo > 0 ? std::min(std::sqrt(d), d / lo) : std::sqrt(d));
-  return detail::around(value, {lo, hi}, relative, absolute, square.flags);
+  const Bounded result = detail::around(value, {lo, hi}, relative, absolute, square.flags);
+  return detail::clipped(result, 0, kInfinity);
 }
 
 Bounded normalizedComponent(std::span<const Bounded> a, std::size_t k) noexcept {
@@ -120,7 +121,9 @@ Bounded normalizedComponent(std::span<const Bounded> a, std::size_t k) noexcept 
                               (1 + detail::relativeError(Operation::inverseSqrt)) /
                               std::sqrt(1 - std::min(ofSquare, 0.5)) -
                           1;
-  return detail::around(value, unitRange(a[k], others), relative, kMinNormal, square.flags);
+  const Bounded result =
+      detail::around(value, unitRange(a[k], others), relative, kMinNormal, square.flags);
+  return detail::clipped(result, a[k].lo >= 0 ? 0 : -kInfinity, a[k].hi <= 0 ? 0 : kInfinity);
 }
 
 // Distributed, the terms are i[k] and the n products 2 n[j] i[j] n[k]; dot, the product by n[k] and

@@ -143,7 +143,7 @@ Bounded pow(const Bounded& x, const Bounded& y) noexcept {
   const double relative = std::exp2(moved) * (1 + exp2Error) - 1;
   const Bounded result = detail::around(value, {lo, hi}, relative, 0, flags);
   // A denormal result errs by whole denormals, and a flushed one by all of itself.
-  return detail::floatsIn(value, std::min(result.lo, lo < 2 * kMinNormal ? 0 : kInfinity),
+  return detail::floatsIn(value, lo < 2 * kMinNormal ? 0 : std::max(result.lo, 0.0),
                           std::max(result.hi, hi < kMinNormal ? 2 * kMinNormal : 0), flags);
 }
 
@@ -200,7 +200,7 @@ Bounded acos(const Bounded& x) noexcept {
   const Range angle{std::acos(x.hi), std::acos(x.lo)};
   if (const auto known = measured(Operation::acos, value, angle, x.flags)) return *known;
   const double sine = std::min(std::sin(angle.lo), std::sin(angle.hi));
-  return inheritedAngle(x, value, angle, complementError(sine));
+  return detail::clipped(inheritedAngle(x, value, angle, complementError(sine)), 0, kInfinity);
 }
 
 Bounded atan(const Bounded& x) noexcept {

@@ -26,26 +26,30 @@ Vec3<T> zero() {
 }
 
 template <class T>
+Vec3<T> splat(const T& x) {
+  return {x, x, x};
+}
+
+template <class T>
+T largestComponent(const Vec3<T>& v) {
+  return max(max(abs(v.x), abs(v.y)), abs(v.z));
+}
+
+template <class T>
 auto isZero(const Vec3<T>& v) {
   return v.x == T(0) && v.y == T(0) && v.z == T(0);
 }
 
-/// v / |v|, or zero for a vector that the contract counts as zero.
+/// The vector itself, or zero if it is too short to be a unit vector.
 template <class T>
-Vec3<T> unitOrZero(const Vec3<T>& v, float shortest) {
-  const T largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
-  const auto usable = largest >= T(shortest) && largest <= T(kLongestVector);
-  return select(usable, v * inversesqrt(dot(v, v)), zero<T>());
+Vec3<T> unitOrZero(const vec3& v) {
+  const Vec3<T> u = clamp(input<T>(finiteOrZero(v)), T(-1), T(1));
+  return select(largestComponent(u) >= T(kShortestUnit), u, zero<T>());
 }
 
 template <class T>
-Vec3<T> direction(const vec3& v) {
-  return unitOrZero(input<T>(finiteOrZero(v)), kShortestVector);
-}
-
-template <class T>
-T cosine(const Vec3<T>& a, const Vec3<T>& b) {
-  return clamp(dot(a, b), T(0), T(1));
+T cosine(const T& x) {
+  return clamp(x, T(0), T(1));
 }
 
 template <class T>
@@ -64,19 +68,12 @@ T pow5(const T& x) {
   return x2 * x2 * x;
 }
 
-template <class T>
-Vec3<T> splat(const T& x) {
-  return {x, x, x};
-}
-
 }  // namespace
 
 template <class T>
-T D_GGX(const Vec3<T>& n, const Vec3<T>& h, const T& alpha) {
-  const Vec3<T> sine = cross(n, h);
-  const T cosTheta = cosine(n, h);
+T D_GGX(const Vec3<T>& nxh, const T& NoH, const T& alpha) {
   const T alpha2 = alpha * alpha;
-  const T d = dot(sine, sine) + cosTheta * cosTheta * alpha2;
+  const T d = dot(nxh, nxh) + NoH * NoH * alpha2;
   return alpha2 / (pi<T>() * d * d);
 }
 
@@ -102,23 +99,25 @@ Vec3<T> F_SchlickRoughness(const T& NoV, const Vec3<T>& F0, const T& r) {
 
 template <class T>
 ShadedOf<T> evaluate(const Sample& s) {
-  const Vec3<T> n = direction<T>(s.normal), v = direction<T>(s.view), l = direction<T>(s.light);
-  const Vec3<T> h = unitOrZero(v + l, kShortestHalf);
-  if (isZero(n) || isZero(v) || isZero(l) || isZero(h))
+  const Vec3<T> n = unitOrZero<T>(s.normal), v = unitOrZero<T>(s.view), l = unitOrZero<T>(s.light);
+  const Vec3<T> halfway = v + l;
+  if (isZero(n) || isZero(v) || isZero(l) || largestComponent(halfway) < T(kShortestHalf))
     return {T(0), T(0), zero<T>(), zero<T>(), zero<T>(), zero<T>(), zero<T>()};
 
   const T r = limited<T>(s.roughness, kMinRoughness, 1);
   const T metallic = limited<T>(s.metallic, 0, 1);
   const Vec3<T> albedo = limited<T>(s.albedo, 1);
   const Vec3<T> irradiance = limited<T>(s.irradiance, kMaxIrradiance);
-  const T NoV = max(cosine(n, v), T(kMinNoV));
-  const T NoL = cosine(n, l);
-  const T VoH = cosine(v, h);
+  const T scale = inversesqrt(dot(halfway, halfway));
+  const Vec3<T> nxh = cross(n, halfway) * scale;
+  const T NoV = max(cosine(dot(n, v)), T(kMinNoV));
+  const T NoL = cosine(dot(n, l));
+  const T VoH = cosine(dot(v, halfway) * scale);
   const Vec3<T> F0 = mix(splat(T(kDielectricF0)), albedo, metallic);
   const T k = kDirect(r);
 
   ShadedOf<T> o;
-  o.D = D_GGX(n, h, r * r);
+  o.D = D_GGX(nxh, dot(n, halfway) * scale, r * r);
   o.G = G1_Schlick(NoV, k) * G1_Schlick(NoL, k);
   o.F = F_Schlick(VoH, F0);
   o.ambientF = F_SchlickRoughness(NoV, F0, r);
@@ -128,7 +127,7 @@ ShadedOf<T> evaluate(const Sample& s) {
   return o;
 }
 
-template double D_GGX(const Vec3<double>&, const Vec3<double>&, const double&);
+template double D_GGX(const Vec3<double>&, const double&, const double&);
 template double kDirect(const double&);
 template double G1_Schlick(const double&, const double&);
 template Vec3<double> F_Schlick(const double&, const Vec3<double>&);

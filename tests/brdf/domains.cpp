@@ -4,17 +4,10 @@
 #include <limits>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 namespace gnomon::brdf {
 namespace {
-
-vec3 scaled(const glm::dvec3& direction, double length) { return vec3(direction * length); }
-
-/// Directions are normalised by the kernel, so their length is stimulus too: mostly 1, else any
-/// power of two between 2^-40 and 2^40.
-double anyLength(Random& random) {
-  return random.chance(0.75) ? 1 : std::exp2(random.uniform(-40, 40));
-}
 
 vec3 colour(Random& random) {
   return {static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
@@ -29,11 +22,11 @@ float metalness(Random& random) {
 
 Sample shaded(Random& random, const glm::dvec3& n, const glm::dvec3& v, const glm::dvec3& l,
               double roughness) {
-  return {.normal = scaled(n, anyLength(random)),
+  return {.normal = vec3(n),
           .roughness = static_cast<float>(roughness),
-          .view = scaled(v, anyLength(random)),
+          .view = vec3(v),
           .metallic = metalness(random),
-          .light = scaled(l, anyLength(random)),
+          .light = vec3(l),
           .albedo = colour(random),
           .irradiance = colour(random) * static_cast<float>(random.logUniform(0.01, 100))};
 }
@@ -106,13 +99,13 @@ std::vector<Sample> degenerate() {
       0.0f,          -0.0f,          1.0f,           -1.0f,          0.5f,
       2.0f,          -2.0f,          Limits::min(),  -Limits::min(), Limits::denorm_min(),
       Limits::max(), Limits::lowest(), Limits::infinity(), -Limits::infinity(),
-      Limits::quiet_NaN(), -Limits::quiet_NaN(), kMinRoughness, kShortestVector, kLongestVector,
+      Limits::quiet_NaN(), -Limits::quiet_NaN(), kMinRoughness, kShortestHalf, kMinNoV,
       1e-10f,        1e10f,          1e-30f,         1e30f};
-  const Sample ordinary{.normal = {0.1f, 0.2f, 0.9f},
+  const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
-                        .view = {0.3f, -0.2f, 0.8f},
+                        .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),
                         .metallic = 0.3f,
-                        .light = {-0.5f, 0.1f, 0.7f},
+                        .light = glm::normalize(vec3(-0.5f, 0.1f, 0.7f)),
                         .albedo = {0.9f, 0.5f, 0.2f},
                         .irradiance = {3.0f, 2.0f, 1.0f}};
   std::vector<Sample> all = {ordinary};
@@ -140,6 +133,9 @@ std::vector<Sample> degenerate() {
   Sample opposite = ordinary;
   opposite.light = -opposite.view;
   all.push_back(opposite);
+  Sample behind = ordinary;
+  behind.view = behind.light = -behind.normal;  // NoH = -1, where a clamped cosine leaves d = 0
+  all.push_back(behind);
   return all;
 }
 

@@ -10,7 +10,7 @@
 
 namespace gnomon::brdf {
 
-/// Directions all around, any vector length, r in [0.2, 1]: what a scene is made of.
+/// Directions all around, r in [0.2, 1]: what a scene is made of.
 std::vector<Sample> bulk(std::size_t n, std::uint64_t seed);
 
 /// The half vector drawn from the GGX lobe itself at r in [0, 0.2], where D is steep.

@@ -29,11 +29,9 @@ constexpr double kPi = std::numbers::pi;
 // half an ULP for each constant and its power, here pi once and twice for squares.
 constexpr double kFloatConstants = 4 * std::numeric_limits<float>::epsilon();
 
-const Vec3<double> kUp{0, 0, 1};
-
-Vec3<double> tilted(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
-
-double modelD(double theta, double alpha) { return D_GGX(kUp, tilted(theta), alpha); }
+double modelD(double theta, double alpha) {
+  return D_GGX({0, std::sin(theta), 0}, std::cos(theta), alpha);
+}
 
 constexpr std::array kAlphas = {0.002025, 0.01, 0.04, 0.1, 0.25, 0.5, 0.75, 1.0};
 

@@ -201,6 +201,12 @@ TEST(BoundSelect, OnAnUnspecifiedValueIsUnspecified) {
   EXPECT_TRUE(select(sqrt(Bounded(-1)) < 1, Bounded(2), Bounded(3)).unspecified());
 }
 
+TEST(BoundSelect, OnAMaybeNanIsOpenButNoNan) {
+  const Bounded x = select(Bounded(kQuiet) < 1, Bounded(2), Bounded(3));
+  EXPECT_TRUE(is(x, 2, 3));
+  EXPECT_FALSE(x.mayBeNan());
+}
+
 TEST(BoundSelect, OfEqualSidesIsNotAmbiguous) {
   EXPECT_FALSE(select(Bounded::between(0, 1) < 0.5f, Bounded(2), Bounded(2)).ambiguous());
 }
@@ -280,6 +286,14 @@ TEST(BoundRules, MeasuredErrorReplacesTheFormula) {
   EXPECT_TRUE(is(sqrt(Bounded(2)), floorToFloat(std::sqrt(2.0)), ceilToFloat(std::sqrt(2.0))));
   EXPECT_GT(specified.hi - specified.lo, 8 * 0x1p-23);
   EXPECT_TRUE(sqrt(Bounded(-1)).unspecified());
+}
+
+TEST(BoundRules, PartsOfFormulasAreMeasuredInUlpAlone) {
+  Rules device;
+  EXPECT_THROW(device.measure(Operation::divide, {2.5, 0x1p-20}), std::invalid_argument);
+  device.measure(Operation::sin, {0, 0x1p-20});
+  const UseRules use(device);
+  EXPECT_LE(sin(Bounded(1)).hi - sin(Bounded(1)).lo, 2 * 0x1p-20);
 }
 
 TEST(BoundText, NamesTheCulprits) {
