@@ -49,8 +49,8 @@ void timeKernel(benchmark::State& state, const std::string& kernel, const Stimul
     // The first run pays for what the driver does once.
     subject.gpu().run({&timed.dispatch, 1}, session.limit());
     for (auto _ : state)
-      state.SetIterationTime(
-          subject.gpu().run({&timed.dispatch, 1}, session.limit()).front() * 1e-9);
+      state.SetIterationTime(subject.gpu().run({&timed.dispatch, 1}, session.limit()).front() *
+                             1e-9);
     state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(stimulus.items));
     state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(timed.bytes));
     state.SetLabel(subject.gpu().info().name);

@@ -35,9 +35,10 @@ DeviceErrors parse(const fs::path& file) {
   std::ifstream in(file);
   const auto json = nlohmann::json::parse(in, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || !json.contains("operations") || !json["operations"].is_object())
-    throw UsageError(fmt::format("{}: not a file of measured errors; `gnomon validate precision` "
-                                 "writes it anew",
-                                 file.string()));
+    throw UsageError(
+        fmt::format("{}: not a file of measured errors; `gnomon validate precision` "
+                    "writes it anew",
+                    file.string()));
   DeviceErrors errors;
   for (const auto& [name, entry] : json["operations"].items()) {
     const auto operation = operationNamed(name);
@@ -85,11 +86,10 @@ std::string deviceErrorsJson(const GpuInfo& gpu, const DeviceErrors& errors) {
                                                   {"worstAt", e.worstAt},
                                                   {"arguments", e.arguments},
                                                   {"exhaustive", e.exhaustive}};
-  return nlohmann::json{
-             {"schema", 1},
-             {"device", {{"name", gpu.name}, {"driver", gpu.driver}, {"api", gpu.api}}},
-             {"command", "gnomon validate precision --out DIR"},
-             {"operations", operations}}
+  return nlohmann::json{{"schema", 1},
+                        {"device", {{"name", gpu.name}, {"driver", gpu.driver}, {"api", gpu.api}}},
+                        {"command", "gnomon validate precision --out DIR"},
+                        {"operations", operations}}
              .dump(1) +
          "\n";
 }

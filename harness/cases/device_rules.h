@@ -13,8 +13,8 @@
 namespace gnomon {
 
 struct MeasuredError {
-  Error worst;           ///< over the operation's domain, against double
-  double worstAt = 0;    ///< the first argument there
+  Error worst;         ///< over the operation's domain, against double
+  double worstAt = 0;  ///< the first argument there
   std::size_t arguments = 0;
   bool exhaustive = false;  ///< every float of the domain, not a stratified sample
 };

@@ -71,8 +71,7 @@ void forEachScalar(T& x, F& f) {
 /// An expectation from a model that is one function template over the number type:
 /// `model.template operator()<T>(i)` returns a struct whose scalars are those of the contract.
 template <class Model, class Describe>
-Expectation expectationOf(std::string buffer, std::size_t elements, Model model,
-                          Describe inputs) {
+Expectation expectationOf(std::string buffer, std::size_t elements, Model model, Describe inputs) {
   Expectation e;
   e.buffer = std::move(buffer);
   e.elements = elements;

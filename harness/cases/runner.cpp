@@ -51,8 +51,8 @@ void refuseUnknownStages(const std::vector<std::string>& wanted) {
   }
   for (const std::string& stage : wanted)
     if (!known.contains(stage))
-      throw UsageError(
-          fmt::format("there is no stage '{}'.\nStages and kernels: {}", stage, fmt::join(known, ", ")));
+      throw UsageError(fmt::format("there is no stage '{}'.\nStages and kernels: {}", stage,
+                                   fmt::join(known, ", ")));
 }
 
 bool belongs(const CaseName& c, const std::vector<std::string>& stages) {
@@ -69,8 +69,8 @@ std::vector<CaseName> allCases() {
       const testing::TestSuite& suite = *tests.GetTestSuite(s);
       if (kernelOf(suite.name()) != record->name()) continue;
       for (int t = 0; t < suite.total_test_count(); ++t)
-        all.push_back({fmt::format("{}.{}", suite.name(), suite.GetTestInfo(t)->name()),
-                       record->name()});
+        all.push_back(
+            {fmt::format("{}.{}", suite.name(), suite.GetTestInfo(t)->name()), record->name()});
     }
   return all;
 }
@@ -91,7 +91,11 @@ class Listener : public testing::EmptyTestEventListener {
 
   void OnTestPartResult(const testing::TestPartResult& part) override {
     CaseRecord& record = session.currentCase();
-    if (part.failed()) record.messages.push_back(part.message());
+    // ADD_FAILURE() puts a line of its own first, which says nothing.
+    const std::string_view message = part.message();
+    if (part.failed())
+      record.messages.emplace_back(
+          message.starts_with("Failed\n") ? message.substr(message.find('\n') + 1) : message);
     if (part.skipped() && !record.unsupported) record.skipped = part.message();
   }
 
@@ -130,7 +134,8 @@ void runCases(Session& session, const std::vector<CaseName>& cases, const Observ
   testing::TestEventListeners& listeners = testing::UnitTest::GetInstance()->listeners();
   delete listeners.Release(listeners.default_result_printer());
   listeners.Append(new Listener(session, cases, observer));
-  // GoogleTest runs suites as the linker ordered them; ours build on each other, so kernel by kernel.
+  // GoogleTest runs suites as the linker ordered them; ours build on each other, so kernel by
+  // kernel.
   for (std::size_t begin = 0, end = 0; begin < cases.size(); begin = end) {
     std::vector<std::string> names;
     for (; end < cases.size() && cases[end].kernel == cases[begin].kernel; ++end)

@@ -18,7 +18,7 @@ struct CaseName {
 struct Selection {
   std::vector<std::string> stages{};  ///< STAGE or STAGE/ENTRY; empty: all
   std::string filter{};               ///< shell pattern on the name; empty: all
-  unsigned shard = 1, shards = 1;   ///< the shard-th of so many parts, from 1
+  unsigned shard = 1, shards = 1;     ///< the shard-th of so many parts, from 1
 };
 
 /// The cases chosen, in order of stages. Throws UsageError naming a stage that does not exist, or

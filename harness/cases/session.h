@@ -34,7 +34,7 @@ struct CaseRecord {
   bool failed = false;
   std::optional<std::string> skipped{};      ///< why
   std::optional<std::string> unsupported{};  ///< what the device lacks
-  std::size_t elements = 0;                ///< checked, by a verdict or by a law
+  std::size_t elements = 0;                  ///< checked, by a verdict or by a law
   double seconds = 0;
   std::vector<Verdict> verdicts{};
   std::vector<std::string> messages{};  ///< one for each failure

@@ -43,8 +43,8 @@ class Reporter : public benchmark::BenchmarkReporter {
  private:
   void keep(const Run& run) {
     const std::string name = run.run_name.str();
-    const double ns = run.GetAdjustedRealTime() /
-                      benchmark::GetTimeUnitMultiplier(run.time_unit) * 1e9;
+    const double ns =
+        run.GetAdjustedRealTime() / benchmark::GetTimeUnitMultiplier(run.time_unit) * 1e9;
     times[name] = ns;
     const auto rate = [&](const char* counter, double unit) {
       const auto found = run.counters.find(counter);
@@ -74,8 +74,8 @@ Times readBaseline(const std::filesystem::path& file) {
     times[b.value("run_name", std::string())] = b.value("real_time", 0.0) * unit->second;
   }
   if (times.empty())
-    throw UsageError(fmt::format("{}: holds no medians; write it with `gnomon bench --json`",
-                                 file.string()));
+    throw UsageError(
+        fmt::format("{}: holds no medians; write it with `gnomon bench --json`", file.string()));
   return times;
 }
 
@@ -97,8 +97,7 @@ bool slowerThan(const Times& before, const Times& now, double allowed, Terminal&
                                    fmt::format("{:.2f}", ratio))});
   }
   terminal.print(table(rows, "lrrr"));
-  if (slower)
-    terminal.print(fmt::format("slower than the baseline by more than {:.2f}", allowed));
+  if (slower) terminal.print(fmt::format("slower than the baseline by more than {:.2f}", allowed));
   return slower;
 }
 

@@ -37,9 +37,9 @@ struct ValidateOptions {
   SessionOptions session;
   Selection selection;
   std::string json;
-  std::filesystem::path out;    ///< folder for what each case found
+  std::filesystem::path out;  ///< folder for what each case found
   std::filesystem::path junit;
-  bool require = false;         ///< unsupported and skipped cases are failures
+  bool require = false;  ///< unsupported and skipped cases are failures
 };
 int validate(const ValidateOptions& options);
 

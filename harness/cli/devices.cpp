@@ -12,9 +12,9 @@ namespace gnomon {
 namespace {
 
 std::string text(const GpuInfo& gpu) {
-  std::string lines = fmt::format("{}  {}\n   {}, Vulkan {}, subgroup {}{}\n", gpu.index, gpu.name,
-                                  gpu.driver, gpu.api, gpu.subgroupSize,
-                                  gpu.software ? ", software" : "");
+  std::string lines =
+      fmt::format("{}  {}\n   {}, Vulkan {}, subgroup {}{}\n", gpu.index, gpu.name, gpu.driver,
+                  gpu.api, gpu.subgroupSize, gpu.software ? ", software" : "");
   lines += fmt::format("   float32: round to nearest even {}, signed zero, Inf and NaN kept {}\n",
                        gpu.roundingRteFloat32 ? "yes" : "no",
                        gpu.signedZeroInfNanFloat32 ? "yes" : "no");

@@ -48,8 +48,7 @@ int list(const ListOptions& options) {
   if (!options.json.empty()) {
     auto array = nlohmann::json::array();
     for (const Line& l : lines) array.push_back(l.name);
-    writeText(options.json,
-              nlohmann::json{{"schema", 1}, {options.what, array}}.dump(1) + "\n");
+    writeText(options.json, nlohmann::json{{"schema", 1}, {options.what, array}}.dump(1) + "\n");
   }
   return kGood;
 }

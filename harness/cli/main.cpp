@@ -100,8 +100,9 @@ void addValidate(CLI::App& app, Action& action) {
           "--cases", [o](std::size_t n) { o->session.cases = n; },
           "Generated inputs of each case (default: tests/policy.json)")
       ->check(CLI::PositiveNumber);
-  command->add_option("--filter", o->selection.filter,
-                      "Only cases whose name (see `list cases`) matches the shell pattern")
+  command
+      ->add_option("--filter", o->selection.filter,
+                   "Only cases whose name (see `list cases`) matches the shell pattern")
       ->type_name("GLOB");
   command->add_option("--out", o->out, "Write what each case found into DIR")->type_name("DIR");
   command->add_option("--junit", o->junit, "Write JUnit XML to FILE")->type_name("FILE");

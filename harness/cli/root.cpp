@@ -9,7 +9,9 @@ namespace gnomon {
 
 std::filesystem::path sourceRoot() {
   namespace fs = std::filesystem;
-  const auto holds = [](const fs::path& folder) { return fs::exists(folder / "tests/policy.json"); };
+  const auto holds = [](const fs::path& folder) {
+    return fs::exists(folder / "tests/policy.json");
+  };
   if (const char* given = std::getenv("GNOMON_ROOT")) {
     if (holds(given)) return given;
     throw UsageError(fmt::format("GNOMON_ROOT is {}, which holds no tests/policy.json", given));
@@ -19,8 +21,9 @@ std::filesystem::path sourceRoot() {
   for (fs::path folder = command.parent_path(); folder != folder.root_path();
        folder = folder.parent_path())
     if (holds(folder)) return folder;
-  throw UsageError("the source tree (kernels/, tests/policy.json) is not where it was built from; "
-                   "set GNOMON_ROOT to it");
+  throw UsageError(
+      "the source tree (kernels/, tests/policy.json) is not where it was built from; "
+      "set GNOMON_ROOT to it");
 }
 
 }  // namespace gnomon

@@ -20,8 +20,8 @@ void loadForeignKernels(Session& session) {
 
 std::string failureText(const Terminal& terminal, const CaseRecord& record,
                         const SessionOptions& options) {
-  std::string text = terminal.paint(Colour::kRed, "FAILED") + " " + record.name + " (" +
-                     record.kernel + ")\n";
+  std::string text =
+      terminal.paint(Colour::kRed, "FAILED") + " " + record.name + " (" + record.kernel + ")\n";
   // The first message says most; a broken kernel repeats it for every size and domain.
   text += record.messages.front();
   if (text.back() != '\n') text += '\n';
@@ -49,12 +49,14 @@ void writeFindings(const std::filesystem::path& folder, const Session& session,
   std::filesystem::create_directories(folder, error);
   if (error) throw UsageError(fmt::format("--out {}: {}", folder.string(), error.message()));
   for (const CaseRecord& r : session.cases()) {
-    std::string text = fmt::format("{} ({}): {}\n", r.name, r.kernel, r.failed ? "failed" : "passed");
+    std::string text =
+        fmt::format("{} ({}): {}\n", r.name, r.kernel, r.failed ? "failed" : "passed");
     for (const Verdict& v : r.verdicts)
       for (const FieldVerdict& f : v.fields)
-        text += fmt::format("{:<12} budget {:<10.3g} median width {:.3g} (specification) {:.3g} "
-                            "(device)\n",
-                            f.name, f.budget, f.specWidth, f.deviceWidth);
+        text += fmt::format(
+            "{:<12} budget {:<10.3g} median width {:.3g} (specification) {:.3g} "
+            "(device)\n",
+            f.name, f.budget, f.specWidth, f.deviceWidth);
     for (const std::string& m : r.messages) text += "\n" + m;
     writeText(folder / (r.name + ".txt"), text);
   }

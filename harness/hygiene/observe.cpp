@@ -142,10 +142,11 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
                                    unwritten, first.size() / kWord, out.spec->name,
                                    where(out, firstUnwritten)));
   if (differing > 0 && deterministic)
-    findings.push_back(fmt::format(
-        "two runs of the {} on the same input differ in {} words of '{}', first {}: it reads memory "
-        "that nobody wrote, or its threads race",
-        module, differing, out.spec->name, where(out, firstDiffering)));
+    findings.push_back(
+        fmt::format("two runs of the {} on the same input differ in {} words of '{}', first {}: it "
+                    "reads memory "
+                    "that nobody wrote, or its threads race",
+                    module, differing, out.spec->name, where(out, firstDiffering)));
 }
 
 Bytes elementsIn(const Output& out, const Bytes& whole) {
@@ -159,8 +160,7 @@ std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
                                            const char* module, std::vector<std::string>& findings,
                                            double* ns) {
   std::vector<Bytes> runs[2];
-  for (int i : {0, 1})
-    runs[i] = runOnce(subject, setup, program, kPoison[i], stimulus.limit, ns);
+  for (int i : {0, 1}) runs[i] = runOnce(subject, setup, program, kPoison[i], stimulus.limit, ns);
   std::map<std::string, Bytes> data;
   for (std::size_t o = 0; o < setup.outputs.size(); ++o) {
     const Output& out = setup.outputs[o];

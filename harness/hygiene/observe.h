@@ -36,7 +36,7 @@ struct Observation {
   std::map<std::string, std::vector<std::byte>> plain{};  ///< outputs of the module as it is
   std::map<std::string, std::vector<std::byte>> twin{};   ///< outputs of its strict twin
   std::vector<std::string> findings{};  ///< hygiene: one sentence each; empty if clean
-  double gpuNanoseconds = 0;          ///< fastest run of the plain module
+  double gpuNanoseconds = 0;            ///< fastest run of the plain module
 };
 
 /// Outputs and guard bands are poisoned before every run, with one pattern in the first and another
@@ -50,7 +50,8 @@ struct Observation {
 Observation observe(const Subject& subject, const Stimulus& stimulus);
 
 /// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so
-/// many that checking each would take hours. What is measured so has to be observed on a part first.
+/// many that checking each would take hours. What is measured so has to be observed on a part
+/// first.
 std::map<std::string, std::vector<std::byte>> runTwinOnce(const Subject& subject,
                                                           const Stimulus& stimulus);
 

@@ -151,7 +151,8 @@ void prepare(glslang::TShader& shader, EShLanguage stage, const std::string& pre
   shader.setEnvInput(glslang::EShSourceGlsl, stage, glslang::EShClientVulkan, 100);
   shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_2);
   shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_5);
-  shader.setDebugInfo(true);
+  // Not setDebugInfo(): that is for NonSemantic.Shader.DebugInfo, and without its instruction set
+  // glslang 12 writes lexical scopes that refer to id 0.
 }
 
 std::string preambleOf(const CompileOptions& options) {

@@ -85,7 +85,7 @@ struct BufferSpec {
 
 /// One entry of a stage: everything a run of it needs to know.
 struct KernelRecord {
-  int order = 0;      ///< of the stage, as a frame runs them (README's stage table)
+  int order = 0;        ///< of the stage, as a frame runs them (README's stage table)
   std::string stage{};  ///< "brdf"
   std::string entry{};  ///< "evaluate"
   std::string file{};   ///< under kernels/
@@ -95,8 +95,8 @@ struct KernelRecord {
   std::function<std::array<std::uint32_t, 3>(std::size_t items)> grid;
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
-  bool deterministic = true;          ///< two runs on the same input agree to the bit
-  std::string summary{};                ///< one line for `gnomon list kernels`
+  bool deterministic = true;  ///< two runs on the same input agree to the bit
+  std::string summary{};      ///< one line for `gnomon list kernels`
 
   std::string name() const { return stage + "/" + entry; }
   const BufferSpec& buffer(std::string_view called) const;

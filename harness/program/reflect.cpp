@@ -379,12 +379,12 @@ const char* stageName(SpvExecutionModel model) {
   }
 }
 
-/// LocalSize or LocalSizeId, overridden by a constant decorated with the WorkgroupSize built-in
-/// (which is how glslang writes local_size_x_id before SPIR-V 1.6).
+/// SPIRV-Cross answers alike for LocalSize, LocalSizeId and what overrides them: a constant with
+/// the WorkgroupSize built-in (which is how glslang writes local_size_x_id before SPIR-V 1.6).
 void describeGroupSize(const Cross& cross, Reflection& reflection) {
   std::array<spvc_specialization_constant, 3> constants{};
-  const spvc_constant_id builtIn = spvc_compiler_get_work_group_size_specialization_constants(
-      cross.compiler, &constants[0], &constants[1], &constants[2]);
+  spvc_compiler_get_work_group_size_specialization_constants(cross.compiler, &constants[0],
+                                                             &constants[1], &constants[2]);
   for (unsigned i = 0; i < 3; ++i) {
     reflection.groupSize[i] = spvc_compiler_get_execution_mode_argument_by_index(
         cross.compiler, SpvExecutionModeLocalSize, i);
@@ -392,13 +392,6 @@ void describeGroupSize(const Cross& cross, Reflection& reflection) {
     reflection.groupSize[i] = cross.constantValue(constants[i].id);
     reflection.groupSizeIds[i] = constants[i].constant_id;
   }
-  if (builtIn == 0) return;
-  const spvc_constant composite = spvc_compiler_get_constant_handle(cross.compiler, builtIn);
-  const spvc_constant_id* parts = nullptr;
-  std::size_t count = 0;
-  spvc_constant_get_subconstants(composite, &parts, &count);
-  for (std::size_t i = 0; i < std::min<std::size_t>(count, 3); ++i)
-    reflection.groupSize[i] = cross.constantValue(parts[i]);
 }
 
 void describePush(const Cross& cross, Reflection& reflection) {

@@ -27,11 +27,11 @@ struct ReflectedMember {
   /// "lights[4].color", "ids[]"), without the block's own name. Empty for the element of a block
   /// that is one runtime array of scalars, vectors or matrices.
   std::string path{};
-  std::string type{};     ///< GLSL spelling: "float", "vec3", "uint", "mat4", "mat3x2"
+  std::string type{};   ///< GLSL spelling: "float", "vec3", "uint", "mat4", "mat3x2"
   unsigned offset = 0;  ///< bytes from the start of the element (runtime array) or block
   unsigned size = 0;    ///< bytes of one scalar, vector or matrix, of all its array elements not
   std::vector<ReflectedArray> arrays{};  ///< the dimensions in the path, outermost first
-  unsigned matrixStride = 0;           ///< bytes from column to column, or row to row; 0: no matrix
+  unsigned matrixStride = 0;  ///< bytes from column to column, or row to row; 0: no matrix
   bool rowMajor = false;
 };
 
@@ -50,9 +50,9 @@ struct ReflectedBinding {
   unsigned count = 1;  ///< descriptors of an array of bindings; 0: sized at run time
   unsigned stride =
       0;  ///< bytes from element to element of a block that is one runtime array; 0: none
-  unsigned bytes = 0;                    ///< of a block, its runtime array taken as empty
-  bool readOnly = false;                 ///< NonWritable
-  bool writeOnly = false;                ///< NonReadable
+  unsigned bytes = 0;                      ///< of a block, its runtime array taken as empty
+  bool readOnly = false;                   ///< NonWritable
+  bool writeOnly = false;                  ///< NonReadable
   std::vector<ReflectedMember> members{};  ///< of one element where stride > 0, else of the block
 };
 
@@ -65,7 +65,7 @@ struct ReflectedConstant {
 
 struct Reflection {
   std::string entryPoint{};
-  std::string stage{};                           ///< "compute", "vertex", "fragment", ...
+  std::string stage{};                         ///< "compute", "vertex", "fragment", ...
   std::array<unsigned, 3> groupSize{1, 1, 1};  ///< with every specialisation constant's default
   /// Ids of the specialisation constants that set the group size.
   std::array<std::optional<std::uint32_t>, 3> groupSizeIds;
@@ -73,7 +73,7 @@ struct Reflection {
   /// with several, those that this entry point uses.
   std::vector<ReflectedBinding> bindings{};
   std::vector<ReflectedMember> push{};         ///< push-constant members
-  unsigned pushBytes = 0;                    ///< end of the last push-constant member
+  unsigned pushBytes = 0;                      ///< end of the last push-constant member
   std::vector<ReflectedConstant> constants{};  ///< specialisation constants, by id
   std::vector<std::string> capabilities{};     ///< "Shader", "Float64", ...
 };

@@ -127,8 +127,8 @@ std::vector<KernelSummary> summarise(const std::vector<CaseRecord>& records) {
 }
 
 std::string reproduceCommand(const std::string& caseName, const SessionOptions& options) {
-  std::string command = fmt::format("./gnomon validate --filter '{}' --seed {}", caseName,
-                                    options.seed);
+  std::string command =
+      fmt::format("./gnomon validate --filter '{}' --seed {}", caseName, options.seed);
   if (options.cases) command += fmt::format(" --cases {}", *options.cases);
   if (!options.device.empty()) command += fmt::format(" --device '{}'", options.device);
   for (const auto& [kernel, file] : options.kernels)
@@ -143,8 +143,7 @@ std::string summaryTable(const std::vector<KernelSummary>& kernels, const Termin
     const std::string cases = k.failed > 0    ? fmt::format("{} of {} failed", k.failed, k.cases)
                               : k.skipped > 0 ? fmt::format("{} ({} skipped)", k.cases, k.skipped)
                                               : fmt::format("{}", k.cases);
-    rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), cases,
-                    grouped(k.elements),
+    rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), cases, grouped(k.elements),
                     k.maxBudget ? fmt::format("{:.3g}", *k.maxBudget) : "exact",
                     fmt::format("{:.1f} s", k.seconds)});
   }

@@ -43,41 +43,44 @@ struct Bounds {
   static Bounds specification(bool roundingRte);
 };
 
-/// What became of one field of the output over all elements.
-struct FieldVerdict {
-  std::string name;
-  std::size_t outside = 0;     ///< elements of the twin outside the deciding bound
-  double budget = 0;           ///< worst share of the deciding bound that was used; inf if exact
-  double specBudget = 0;       ///< of the specification's bound
-  double specWidth = 0;        ///< median relative width of the specification's interval
-  double deviceWidth = 0;      ///< of the device's interval; 0 without measured rules
-};
-
 /// One scalar that is furthest from what it may be.
 struct Offender {
   std::size_t element = 0;
-  std::string field;       ///< "F.y"
+  std::string field;  ///< "F.y"
   double got = 0;
   double gotPlain = 0;
-  double value = 0;        ///< the model's double
-  double lo = 0, hi = 0;   ///< what was allowed
+  double value = 0;       ///< the model's double
+  double lo = 0, hi = 0;  ///< what was allowed
   double budget = 0;
+};
+
+/// What became of one field of the output over all elements.
+struct FieldVerdict {
+  std::string name;
+  std::size_t outside = 0;        ///< elements of the twin outside the deciding bound
+  double budget = 0;              ///< worst share of the deciding bound that was used; inf if exact
+  double specBudget = 0;          ///< of the specification's bound
+  double specWidth = 0;           ///< median relative width of the specification's interval
+  double deviceWidth = 0;         ///< of the device's interval; 0 without measured rules
+  std::optional<Offender> worst;  ///< where `budget` was used
 };
 
 struct Verdict {
   Class verdict = Class::kConforms;
-  int widening = 0;              ///< k of `equivalent`
+  int widening = 0;  ///< k of `equivalent`
   std::string buffer;
   std::size_t elements = 0;
-  std::size_t bounded = 0;       ///< of them judged by intervals, the rest cleared by the model
-  std::size_t outside = 0;       ///< elements of the twin outside the specification's bound
-  std::size_t outsideDevice = 0; ///< outside the device's bound
-  std::size_t ambiguous = 0;     ///< elements with a joined branch, of the `bounded` ones
-  std::size_t reassociated = 0;  ///< elements of the plain module outside the bound
-  double plainBudget = 0;        ///< worst of the plain module
+  /// Of them judged by intervals. The rest was cleared by the model; or left alone, where the first
+  /// thousands showed that the kernel is wrong at large.
+  std::size_t bounded = 0;
+  std::size_t outside = 0;        ///< elements of the twin outside the specification's bound
+  std::size_t outsideDevice = 0;  ///< outside the device's bound
+  std::size_t ambiguous = 0;      ///< elements with a joined branch, of the `bounded` ones
+  std::size_t reassociated = 0;   ///< elements of the plain module outside the bound
+  double plainBudget = 0;         ///< worst of the plain module
   std::vector<FieldVerdict> fields;
-  std::optional<Offender> worst;       ///< of the twin, or of the plain module if only it is wrong
-  std::vector<std::string> problems;   ///< why it is wrong, one sentence each; hygiene included
+  std::optional<Offender> worst;      ///< of the twin, or of the plain module if only it is wrong
+  std::vector<std::string> problems;  ///< why it is wrong, one sentence each; hygiene included
 
   bool ok() const { return verdict != Class::kWrong; }
   double maxBudget() const;

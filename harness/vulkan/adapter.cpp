@@ -55,8 +55,8 @@ const char* typeName(VkPhysicalDeviceType type) {
   }
 }
 
-/// Two entry points may declare different rounding for different widths only where the device
-/// allows it; a kernel that also computes in 16 or 64 bit would break the rule
+/// RTE for 32 bit alone. Where the device wants the same rounding for all widths, that would be
+/// wrong in a kernel that also computes in 16 or 64 bit
 /// (VUID-RuntimeSpirv-roundingModeIndependence-06292).
 bool canDeclareRte(const VkPhysicalDeviceVulkan12Properties& properties) {
   return properties.shaderRoundingModeRTEFloat32 == VK_TRUE &&

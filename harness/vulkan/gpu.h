@@ -18,10 +18,10 @@ namespace gnomon {
 /// What one Vulkan device is and can do, as far as stages and verdicts ask.
 struct GpuInfo {
   int index = 0;          ///< position in listGpus()
-  std::string name{};       ///< VkPhysicalDeviceProperties::deviceName
-  std::string driver{};     ///< driverName and driverInfo
-  std::string api{};        ///< "1.3.230"
-  std::string type{};       ///< "discrete", "integrated", "virtual", "software" or "other"
+  std::string name{};     ///< VkPhysicalDeviceProperties::deviceName
+  std::string driver{};   ///< driverName and driverInfo
+  std::string api{};      ///< "1.3.230"
+  std::string type{};     ///< "discrete", "integrated", "virtual", "software" or "other"
   bool software = false;  ///< VK_PHYSICAL_DEVICE_TYPE_CPU
   unsigned subgroupSize = 0;
   /// shaderRoundingModeRTEFloat32, declarable for 32 bit alone (roundingModeIndependence).

@@ -8,9 +8,9 @@
 GNOMON_CONTRACT(brdf)
 
 // What is evaluated. Bad input is part of the contract: a component that is NaN or infinite counts
-// as 0, ranges are enforced by clamping, and a vector counts as zero if it is too short to be a unit
-// vector (kShortestUnit). A zero vector makes every output 0; so does a light so nearly opposite to
-// the view that the half vector would be rounding noise (kShortestHalf).
+// as 0, ranges are enforced by clamping, and a vector counts as zero if it is too short to be a
+// unit vector (kShortestUnit). A zero vector makes every output 0; so does a light so nearly
+// opposite to the view that the half vector would be rounding noise (kShortestHalf).
 struct Sample {
   vec3 normal;      // n, unit; components clamped to [-1, 1]
   float roughness;  // perceptual r, clamped to [kMinRoughness, 1]
@@ -22,13 +22,13 @@ struct Sample {
 };
 
 struct Shaded {
-  float D;          // GGX normal distribution, 1/sr; mirrored where NoH < 0
-  float G;          // Smith shadowing-masking, Schlick-GGX with k for direct light, [0, 1]
-  vec3 F;           // Schlick reflectance at VoH, [0, 1]
-  vec3 ambientF;    // Schlick reflectance at NoV, limited by 1 - r, [0, 1]
-  vec3 diffuse;     // Lambert lobe, (1 - F)(1 - metallic) albedo / pi, 1/sr
-  vec3 specular;    // Cook-Torrance lobe, D G F / max(4 NoV NoL, kMinDenominator), 1/sr
-  vec3 radiance;    // (diffuse + specular) NoL irradiance, W/(m^2 sr)
+  float D;        // GGX normal distribution, 1/sr; mirrored where NoH < 0
+  float G;        // Smith shadowing-masking, Schlick-GGX with k for direct light, [0, 1]
+  vec3 F;         // Schlick reflectance at VoH, [0, 1]
+  vec3 ambientF;  // Schlick reflectance at NoV, limited by 1 - r, [0, 1]
+  vec3 diffuse;   // Lambert lobe, (1 - F)(1 - metallic) albedo / pi, 1/sr
+  vec3 specular;  // Cook-Torrance lobe, D G F / max(4 NoV NoL, kMinDenominator), 1/sr
+  vec3 radiance;  // (diffuse + specular) NoL irradiance, W/(m^2 sr)
 };
 
 struct Evaluate {  // push constants
@@ -40,7 +40,7 @@ const float kMinNoV = 1e-4f;
 const float kMinDenominator = 1e-4f;
 const float kDielectricF0 = 0.04f;
 const float kMaxIrradiance = 1e6f;
-const float kShortestUnit = 0.5f;             // largest component; a unit vector has 0.577
+const float kShortestUnit = 0.5f;               // largest component; a unit vector has 0.577
 const float kShortestHalf = 1.52587890625e-5f;  // largest component of v + l, 2^-16
 
 const uint kSamples = 0;  // binding numbers, set 0

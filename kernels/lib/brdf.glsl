@@ -5,7 +5,8 @@
 const float kPi = 3.14159265358979;
 
 // GGX. Walter et al. 2007, eq. 33, of the sine and cosine of the angle between n and h. The usual
-// denominator NoH^2 (a^2 - 1) + 1 cancels inside the lobe; with sin^2 = |n x h|^2 this one does not.
+// denominator NoH^2 (a^2 - 1) + 1 cancels inside the lobe; with sin^2 = |n x h|^2 this one does
+// not.
 float D_GGX(vec3 nxh, float NoH, float a) {
   const float a2 = a * a;
   const float d = dot(nxh, nxh) + NoH * NoH * a2;

@@ -12,24 +12,42 @@ layout(set = 0, binding = kResults, scalar) writeonly buffer Out { Result result
 
 float apply(float x, float y) {
   switch (operation) {
-    case kDivide: return x / y;
-    case kInverseSqrt: return inversesqrt(x);
-    case kSqrt: return sqrt(x);
-    case kExp: return exp(x);
-    case kExp2: return exp2(x);
-    case kLog: return log(x);
-    case kLog2: return log2(x);
-    case kPow: return pow(x, y);
-    case kSin: return sin(x);
-    case kCos: return cos(x);
-    case kTan: return tan(x);
-    case kAsin: return asin(x);
-    case kAcos: return acos(x);
-    case kAtan: return atan(x);
-    case kAtan2: return atan(x, y);
-    case kAdd: return x + y;
-    case kMultiply: return x * y;
-    default: return fma(x, y, x);
+    case kDivide:
+      return x / y;
+    case kInverseSqrt:
+      return inversesqrt(x);
+    case kSqrt:
+      return sqrt(x);
+    case kExp:
+      return exp(x);
+    case kExp2:
+      return exp2(x);
+    case kLog:
+      return log(x);
+    case kLog2:
+      return log2(x);
+    case kPow:
+      return pow(x, y);
+    case kSin:
+      return sin(x);
+    case kCos:
+      return cos(x);
+    case kTan:
+      return tan(x);
+    case kAsin:
+      return asin(x);
+    case kAcos:
+      return acos(x);
+    case kAtan:
+      return atan(x);
+    case kAtan2:
+      return atan(x, y);
+    case kAdd:
+      return x + y;
+    case kMultiply:
+      return x * y;
+    default:
+      return fma(x, y, x);
   }
 }
 

@@ -29,15 +29,16 @@ KernelRecord entry(const char* name, uint operation) {
 }
 
 const bool registered =
-    registerKernel(entry("divide", kDivide)) && registerKernel(entry("inversesqrt", kInverseSqrt)) &&
-    registerKernel(entry("sqrt", kSqrt)) && registerKernel(entry("exp", kExp)) &&
-    registerKernel(entry("exp2", kExp2)) && registerKernel(entry("log", kLog)) &&
-    registerKernel(entry("log2", kLog2)) && registerKernel(entry("pow", kPow)) &&
-    registerKernel(entry("sin", kSin)) && registerKernel(entry("cos", kCos)) &&
-    registerKernel(entry("tan", kTan)) && registerKernel(entry("asin", kAsin)) &&
-    registerKernel(entry("acos", kAcos)) && registerKernel(entry("atan", kAtan)) &&
-    registerKernel(entry("atan2", kAtan2)) && registerKernel(entry("add", kAdd)) &&
-    registerKernel(entry("multiply", kMultiply)) && registerKernel(entry("fma", kFma));
+    registerKernel(entry("divide", kDivide)) &&
+    registerKernel(entry("inversesqrt", kInverseSqrt)) && registerKernel(entry("sqrt", kSqrt)) &&
+    registerKernel(entry("exp", kExp)) && registerKernel(entry("exp2", kExp2)) &&
+    registerKernel(entry("log", kLog)) && registerKernel(entry("log2", kLog2)) &&
+    registerKernel(entry("pow", kPow)) && registerKernel(entry("sin", kSin)) &&
+    registerKernel(entry("cos", kCos)) && registerKernel(entry("tan", kTan)) &&
+    registerKernel(entry("asin", kAsin)) && registerKernel(entry("acos", kAcos)) &&
+    registerKernel(entry("atan", kAtan)) && registerKernel(entry("atan2", kAtan2)) &&
+    registerKernel(entry("add", kAdd)) && registerKernel(entry("multiply", kMultiply)) &&
+    registerKernel(entry("fma", kFma));
 
 }  // namespace
 }  // namespace gnomon::precision

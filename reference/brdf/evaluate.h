@@ -12,8 +12,8 @@
 
 namespace gnomon::brdf {
 
-/// GGX normal distribution in 1/sr: Walter et al. 2007, eq. 33, of n x h and n . h for unit n and h.
-/// With tan^2 = sin^2 / cos^2 the equation is alpha^2 / (pi (sin^2 + alpha^2 cos^2)^2); sin^2 is
+/// GGX normal distribution in 1/sr: Walter et al. 2007, eq. 33, of n x h and n . h for unit n and
+/// h. With tan^2 = sin^2 / cos^2 the equation is alpha^2 / (pi (sin^2 + alpha^2 cos^2)^2); sin^2 is
 /// taken as |n x h|^2, which keeps its digits inside the lobe. (The usual NoH^2 (alpha^2 - 1) + 1
 /// cancels there: at r < 0.2 its interval is 1.5e-2 wide, this one's 6.5e-5.) Even in NoH.
 template <class T>

@@ -37,8 +37,7 @@ double GaussLegendre::operator()(double a, double b, const std::function<double(
   return half * sum;
 }
 
-double hemisphere(const std::function<double(double, double)>& f, double scale,
-                  std::size_t nodes) {
+double hemisphere(const std::function<double(double, double)>& f, double scale, std::size_t nodes) {
   const GaussLegendre rule(nodes);
   return rule(0, 1, [&](double u) {
     const double tangent = scale * u / (1 - u);

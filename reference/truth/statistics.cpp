@@ -32,8 +32,8 @@ double chiSquareTest(const std::vector<double>& observed, const std::vector<doub
     pooledObserved += observed[bin];
     pooledExpected += expected[bin];
     if (pooledExpected < kLeastExpected) continue;
-    statistic += (pooledObserved - pooledExpected) * (pooledObserved - pooledExpected) /
-                 pooledExpected;
+    statistic +=
+        (pooledObserved - pooledExpected) * (pooledObserved - pooledExpected) / pooledExpected;
     bins += 1;
     pooledObserved = pooledExpected = 0;
   }

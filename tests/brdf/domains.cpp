@@ -42,8 +42,8 @@ std::vector<Sample> repeat(std::size_t n, std::uint64_t seed, Make make) {
 
 /// A direction whose cosine with n is near 0: half of them within the clamp kMinNoV of it.
 glm::dvec3 nearHorizon(Random& random, const glm::dvec3& n) {
-  const double cosine = random.chance(0.5) ? random.uniform(-0.01, 0.05)
-                                           : random.uniform(-2 * kMinNoV, 2 * kMinNoV);
+  const double cosine =
+      random.chance(0.5) ? random.uniform(-0.01, 0.05) : random.uniform(-2 * kMinNoV, 2 * kMinNoV);
   return around(n, std::acos(cosine), random.uniform(0, 2 * std::numbers::pi));
 }
 
@@ -70,8 +70,8 @@ std::vector<Sample> lobe(std::size_t n, std::uint64_t seed) {
     const glm::dvec3 normal = random.direction();
     const glm::dvec3 h = around(normal, std::atan(alpha * std::sqrt(u / (1 - u))),
                                 random.uniform(0, 2 * std::numbers::pi));
-    const glm::dvec3 v = around(normal, std::acos(random.uniform(0.1, 1)),
-                                random.uniform(0, 2 * std::numbers::pi));
+    const glm::dvec3 v =
+        around(normal, std::acos(random.uniform(0.1, 1)), random.uniform(0, 2 * std::numbers::pi));
     return shaded(random, normal, v, 2 * glm::dot(v, h) * h - v, r);
   });
 }
@@ -95,12 +95,29 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 
 std::vector<Sample> degenerate() {
   using Limits = std::numeric_limits<float>;
-  constexpr std::array kSpecial = {
-      0.0f,          -0.0f,          1.0f,           -1.0f,          0.5f,
-      2.0f,          -2.0f,          Limits::min(),  -Limits::min(), Limits::denorm_min(),
-      Limits::max(), Limits::lowest(), Limits::infinity(), -Limits::infinity(),
-      Limits::quiet_NaN(), -Limits::quiet_NaN(), kMinRoughness, kShortestHalf, kMinNoV,
-      1e-10f,        1e10f,          1e-30f,         1e30f};
+  constexpr std::array kSpecial = {0.0f,
+                                   -0.0f,
+                                   1.0f,
+                                   -1.0f,
+                                   0.5f,
+                                   2.0f,
+                                   -2.0f,
+                                   Limits::min(),
+                                   -Limits::min(),
+                                   Limits::denorm_min(),
+                                   Limits::max(),
+                                   Limits::lowest(),
+                                   Limits::infinity(),
+                                   -Limits::infinity(),
+                                   Limits::quiet_NaN(),
+                                   -Limits::quiet_NaN(),
+                                   kMinRoughness,
+                                   kShortestHalf,
+                                   kMinNoV,
+                                   1e-10f,
+                                   1e10f,
+                                   1e-30f,
+                                   1e30f};
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
                         .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),
@@ -121,8 +138,8 @@ std::vector<Sample> degenerate() {
       }
     }
   for (const float a : kSpecial)
-    for (vec3 Sample::*vector : {&Sample::normal, &Sample::view, &Sample::light, &Sample::albedo,
-                                 &Sample::irradiance}) {
+    for (vec3 Sample::*vector :
+         {&Sample::normal, &Sample::view, &Sample::light, &Sample::albedo, &Sample::irradiance}) {
       Sample whole = ordinary;
       whole.*vector = vec3(a);
       all.push_back(whole);
@@ -145,8 +162,7 @@ std::string describe(const Sample& s) {
   };
   return vector("normal", s.normal) + fmt::format("    {:<11}{:.9g}\n", "roughness", s.roughness) +
          vector("view", s.view) + fmt::format("    {:<11}{:.9g}\n", "metallic", s.metallic) +
-         vector("light", s.light) + vector("albedo", s.albedo) +
-         vector("irradiance", s.irradiance);
+         vector("light", s.light) + vector("albedo", s.albedo) + vector("irradiance", s.irradiance);
 }
 
 }  // namespace gnomon::brdf

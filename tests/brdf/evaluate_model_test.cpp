@@ -154,8 +154,7 @@ double specularAlbedo(double NoV, double r, double F0) {
   return truth::specularAlbedo(
       NoV, r * r,
       [&](double NoL, double VoH) {
-        return G1_Schlick(NoV, k) * G1_Schlick(NoL, k) *
-               F_Schlick(VoH, Vec3<double>{F0, F0, F0}).x;
+        return G1_Schlick(NoV, k) * G1_Schlick(NoL, k) * F_Schlick(VoH, Vec3<double>{F0, F0, F0}).x;
       },
       200);
 }
@@ -185,15 +184,15 @@ TEST(BrdfEvaluateModel, DiffusePlusSpecularExceedsOneOnlyByTheKnownAmount) {
                        .irradiance = vec3(1)};
         return evaluate<double>(s).diffuse.x * std::cos(theta);
       };
-      highest = std::max(highest, truth::hemisphere(diffuse, 1, 48) +
-                                      specularAlbedo(NoV, r, kDielectricF0));
+      highest = std::max(highest,
+                         truth::hemisphere(diffuse, 1, 48) + specularAlbedo(NoV, r, kDielectricF0));
     }
   EXPECT_GT(highest, 1.07);
   EXPECT_LT(highest, 1.09);
 }
 
-// The three confusions of this stage - k for image-based light, alpha for r, NoV for VoH - leave the
-// interval wherever they change the result by more than what the bulk domain must resolve.
+// The three confusions of this stage - k for image-based light, alpha for r, NoV for VoH - leave
+// the interval wherever they change the result by more than what the bulk domain must resolve.
 TEST(BrdfEvaluateModel, TheBoundTellsTheUsualConfusionsApart) {
   constexpr double kResolution = 1e-5;  // relative: ten times the width of G, F in bulk
   const Rules rules = Rules::specification(Rounding::nearestEven);

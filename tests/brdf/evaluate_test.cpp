@@ -78,7 +78,8 @@ TEST_F(BrdfEvaluate, EveryResultIsFiniteAndInRange) {
     const float* scalars = reinterpret_cast<const float*>(&results[i]);
     for (std::size_t s = 0; s < sizeof(Shaded) / sizeof(float); ++s)
       ASSERT_TRUE(std::isfinite(scalars[s]) && scalars[s] >= 0)
-          << "scalar " << s << " is " << scalars[s] << " for\n" << describe(samples[i]);
+          << "scalar " << s << " is " << scalars[s] << " for\n"
+          << describe(samples[i]);
     ASSERT_LE(results[i].G, 1) << describe(samples[i]);
   }
 }

@@ -37,14 +37,15 @@ struct NumberOf {
 KernelRecord recordOf(bool signOfZero = false) {
   auto x = field("x", &Number::x);
   x.signOfZero = signOfZero;
-  return {.stage = "test",
-          .entry = "kernel",
-          .file = "",
-          .buffers = {{"values", 0, Access::kRead, describe<Number>("Number", field("x", &Number::x))},
-                      {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
-          .push = describe<Push>("Push", field("count", &Push::count)),
-          .grid = linearGrid(64),
-          .features = {"scalarBlockLayout"}};
+  return {
+      .stage = "test",
+      .entry = "kernel",
+      .file = "",
+      .buffers = {{"values", 0, Access::kRead, describe<Number>("Number", field("x", &Number::x))},
+                  {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
+      .push = describe<Push>("Push", field("count", &Push::count)),
+      .grid = linearGrid(64),
+      .features = {"scalarBlockLayout"}};
 }
 
 /// A kernel whose main is `body`, which sees values, results, count and i.
@@ -86,10 +87,11 @@ class Judge : public testing::Test {
     record = recordOf(signOfZero);
     const Subject subject(gpu(), record, kernelWith(body), "judge_test.comp");
     const Push push{static_cast<uint>(values.size())};
-    const Observation seen = observe(subject, {.inputs = {{"values", std::as_bytes(std::span(values))}},
-                                               .outputs = {{"results", values.size()}},
-                                               .push = std::as_bytes(std::span(&push, 1)),
-                                               .items = values.size()});
+    const Observation seen =
+        observe(subject, {.inputs = {{"values", std::as_bytes(std::span(values))}},
+                          .outputs = {{"results", values.size()}},
+                          .push = std::as_bytes(std::span(&push, 1)),
+                          .items = values.size()});
     expected = expectationOf(
         "results", values.size(),
         [values, f]<class T>(std::size_t i) { return NumberOf<T>{f(input<T>(values[i].x))}; },
@@ -150,17 +152,17 @@ TEST_F(Judge, RefusesAWriteOnePastTheEnd) {
 }
 
 TEST_F(Judge, RefusesAReadPastTheEndOfAnInput) {
-  const Verdict v =
-      judged("if (i < count) results[i].x = values[i].x * 3.0 + (values[i + 1u].x - values[i].x - "
-             "0.125);",
-             ramp(200), kTimesThree);  // the ramp's step is 0.125
+  const Verdict v = judged(
+      "if (i < count) results[i].x = values[i].x * 3.0 + (values[i + 1u].x - values[i].x - "
+      "0.125);",
+      ramp(200), kTimesThree);  // the ramp's step is 0.125
   EXPECT_EQ(v.verdict, Class::kWrong);
   EXPECT_EQ(v.worst->element, 199u);
 }
 
 TEST_F(Judge, RefusesAnElementLeftUnwritten) {
-  const Verdict v = judged("if (i + 1u < count) results[i].x = values[i].x * 3.0;", ramp(200),
-                           kTimesThree);
+  const Verdict v =
+      judged("if (i + 1u < count) results[i].x = values[i].x * 3.0;", ramp(200), kTimesThree);
   EXPECT_EQ(v.verdict, Class::kWrong);
   EXPECT_TRUE(mentions(v, "left 1 of 200 words of 'results' unwritten, first results[199].x"));
 }
@@ -239,9 +241,9 @@ TEST_F(Judge, CallsAConstantOffByOnePartInTenThousandWrong) {
 
 TEST_F(Judge, FindsOneWrongElementAmongAMillion) {
   constexpr std::size_t kMany = 1'000'000;
-  const Verdict v = judged(
-      "if (i < count) results[i].x = values[i].x * 3.0 * (i == 765432u ? 1.00001 : 1.0);",
-      ramp(kMany), kTimesThree);
+  const Verdict v =
+      judged("if (i < count) results[i].x = values[i].x * 3.0 * (i == 765432u ? 1.00001 : 1.0);",
+             ramp(kMany), kTimesThree);
   EXPECT_EQ(v.verdict, Class::kWrong);
   EXPECT_EQ(v.outside, 1u);
   EXPECT_EQ(v.worst->element, 765432u);
@@ -256,8 +258,10 @@ TEST_F(Judge, RefusesAModuleThatContradictsTheContractAndNamesBothSides) {
     FAIL() << "accepted";
   } catch (const UsageError& error) {
     const std::string text = error.what();
-    EXPECT_NE(text.find("takes 4 bytes in the shader, 12 in the contract"), std::string::npos) << text;
-    EXPECT_NE(text.find("take 4 bytes in the shader, 8 in the contract"), std::string::npos) << text;
+    EXPECT_NE(text.find("takes 4 bytes in the shader, 12 in the contract"), std::string::npos)
+        << text;
+    EXPECT_NE(text.find("take 4 bytes in the shader, 8 in the contract"), std::string::npos)
+        << text;
   }
 }
 

@@ -278,6 +278,27 @@ TEST(Reflect, LocalSizeIdIsRead) {
   EXPECT_EQ(reflection.groupSizeIds[0], 7u);
 }
 
+TEST(Reflect, TheWorkgroupSizeBuiltInOverridesTheMode) {
+  const Reflection reflection = reflect(assemble(R"(
+    OpCapability Shader
+    OpMemoryModel Logical GLSL450
+    OpEntryPoint GLCompute %main "main"
+    OpExecutionMode %main LocalSize 1 1 1
+    OpDecorate %size BuiltIn WorkgroupSize
+    %void = OpTypeVoid
+    %uint = OpTypeInt 32 0
+    %vector = OpTypeVector %uint 3
+    %four = OpConstant %uint 4
+    %two = OpConstant %uint 2
+    %size = OpConstantComposite %vector %four %two %two
+    %type = OpTypeFunction %void
+    %main = OpFunction %void None %type
+    %label = OpLabel
+    OpReturn
+    OpFunctionEnd)"));
+  EXPECT_EQ(reflection.groupSize, (std::array<unsigned, 3>{4, 2, 2}));
+}
+
 TEST(Reflect, GraphicsStagesAreNamed) {
   EXPECT_EQ(reflect(compile("void main() { gl_Position = vec4(0); }\n", ".vert")).stage, "vertex");
   const std::string fragment = "layout(location = 0) out vec4 c;\nvoid main() { c = vec4(1); }\n";

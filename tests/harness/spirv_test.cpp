@@ -158,9 +158,11 @@ TEST(StrictTwin, ModesAreDeclaredOnlyWhereAllowed) {
 }
 
 // Two entry points, one of them with modes of its own; a decoration group; SPIR-V 1.0.
-std::string oldModule(const std::string& moreModes = "") {
+std::string oldModule(const std::string& moreModes = "", const std::string& declarations = "") {
   return R"(
                OpCapability Shader
+)" + declarations +
+         R"(
                OpMemoryModel Logical GLSL450
                OpEntryPoint GLCompute %1 "first"
                OpEntryPoint GLCompute %2 "second"
@@ -212,6 +214,17 @@ TEST(StrictTwin, AnEntryPointKeepsItsOwnRounding) {
   const std::string text = disassemble(strictTwin(plain, {.roundingModeRte = true}));
   EXPECT_EQ(countOf(text, "RoundingModeRTE 32"), 1u);  // on the second
   EXPECT_EQ(countOf(text, "RoundingModeRTZ 32"), 1u);
+}
+
+TEST(StrictTwin, WhatTheModuleDeclaresAlreadyIsNotDeclaredAgain) {
+  const std::string text = disassemble(strictTwin(
+      assemble(oldModule("OpExecutionMode %1 RoundingModeRTE 32",
+                         "OpCapability RoundingModeRTE\nOpExtension \"SPV_KHR_float_controls\""),
+               SPV_ENV_UNIVERSAL_1_0),
+      {.roundingModeRte = true}));
+  EXPECT_EQ(countOf(text, "OpCapability RoundingModeRTE"), 1u);
+  EXPECT_EQ(countOf(text, "SPV_KHR_float_controls"), 1u);
+  EXPECT_EQ(countOf(text, "RoundingModeRTE 32"), 2u);  // one on each entry point
 }
 
 TEST(StrictTwin, ItStopsTheDeviceFromContracting) {

@@ -110,8 +110,8 @@ float draw(Random& random, const Interval& in) {
   };
   if (random.chance(0.25)) return clampToFloat(random.uniform(in.lo, in.hi));
   const std::int64_t lo = rank(static_cast<float>(in.lo)), hi = rank(static_cast<float>(in.hi));
-  const float any = ranked(lo + static_cast<std::int64_t>(random.below(
-                                    static_cast<std::uint64_t>(hi - lo + 1))));
+  const float any =
+      ranked(lo + static_cast<std::int64_t>(random.below(static_cast<std::uint64_t>(hi - lo + 1))));
   if (random.chance(0.75) || any == 0) return any;
   const double power = std::copysign(std::exp2(std::floor(std::log2(std::abs(any)))), any);
   return clampToFloat(power * (1 + (static_cast<double>(random.below(5)) - 2) * 0x1p-23));
@@ -124,7 +124,8 @@ std::vector<Arguments> stratified(const Subject& subject, std::size_t n, std::ui
     a.x = draw(random, subject.x);
     a.y = subject.arguments == 2 ? draw(random, subject.y) : 0;
     // Divisors are specified down to 2^-126, the smallest normal.
-    if (subject.operation == Operation::divide && std::abs(a.y) < kMin) a.y = std::copysign(float{kMin}, a.y);
+    if (subject.operation == Operation::divide && std::abs(a.y) < kMin)
+      a.y = std::copysign(float{kMin}, a.y);
   }
   return all;
 }
@@ -257,20 +258,22 @@ class WorstErrorIsMeasured : public OperationCase {
   std::vector<Result> twinResults(const std::vector<Arguments>& arguments) {
     const gnomon::Subject& kernel = Session::current().subject(kernelName);
     const Measure push{.count = static_cast<uint>(arguments.size())};
-    const auto bytes = runTwinOnce(kernel, {.inputs = {{"arguments", std::as_bytes(std::span(arguments))}},
-                                            .outputs = {{"results", arguments.size()}},
-                                            .push = std::as_bytes(std::span(&push, 1)),
-                                            .items = arguments.size(),
-                                            .limit = Session::current().limit()});
+    const auto bytes =
+        runTwinOnce(kernel, {.inputs = {{"arguments", std::as_bytes(std::span(arguments))}},
+                             .outputs = {{"results", arguments.size()}},
+                             .push = std::as_bytes(std::span(&push, 1)),
+                             .items = arguments.size(),
+                             .limit = Session::current().limit()});
     return elementsOf<Result>(bytes.at("results"));
   }
 
   MeasuredError measuredError(const Worst& worst, std::size_t arguments, bool exhaustive) const {
     const double at = worst.error.ulp > 0 ? worst.ulpAt : worst.absoluteAt;
-    // A sample may miss the worst: its error is rounded up to the next quarter ULP, or by an eighth.
-    const Error error = exhaustive ? worst.error
-                                   : Error{std::ceil(worst.error.ulp * 4) / 4,
-                                           worst.error.absolute * 1.125};
+    // A sample may miss the worst: its error is rounded up to the next quarter ULP, or by an
+    // eighth.
+    const Error error =
+        exhaustive ? worst.error
+                   : Error{std::ceil(worst.error.ulp * 4) / 4, worst.error.absolute * 1.125};
     return {.worst = error, .worstAt = at, .arguments = arguments, .exhaustive = exhaustive};
   }
 };
@@ -291,7 +294,8 @@ void add(const char* name, const Subject& s) {
 const bool registered = [] {
   for (const Subject& s : kSubjects) {
     add<InsideItsRule>("StaysInsideItsRule", s);
-    if (s.operation && s.kind != Kind::kInherited) add<WorstErrorIsMeasured>("WorstErrorIsMeasured", s);
+    if (s.operation && s.kind != Kind::kInherited)
+      add<WorstErrorIsMeasured>("WorstErrorIsMeasured", s);
   }
   return true;
 }();

@@ -128,6 +128,11 @@ TEST(BoundDivision, IsUnspecifiedForADivisorOutsideItsRange) {
   EXPECT_TRUE((Bounded(1) / Bounded::between(-1, 1)).unspecified());
 }
 
+TEST(BoundDivision, OfADenormalQuotientMayBeFlushed) {
+  EXPECT_EQ((Bounded(0x1p-100f) / 0x1p30f).lo, 0);
+  EXPECT_EQ((Bounded(-0x1p-100f) / 0x1p30f).hi, 0);
+}
+
 TEST(BoundDivision, OfZeroIsZero) { EXPECT_TRUE(is(Bounded(0) / 3, 0, 0)); }
 
 TEST(BoundLiteral, ConvertsThroughFloat) {
@@ -162,6 +167,17 @@ TEST(BoundComparison, IsDecidedOnlyWhereAllResultsAgree) {
   EXPECT_TRUE(certainly(Bounded(0.0f) == -0.0f));
   EXPECT_TRUE((Bounded(kQuiet) < 1).undecided());
   EXPECT_TRUE((Bounded(kQuiet) == Bounded(kQuiet)).undecided());
+}
+
+TEST(BoundComparison, OfAMaybeNanIsOpenWhateverItsInterval) {
+  Bounded maybe = Bounded::between(2, 3);
+  maybe.flags |= kMayBeNan;
+  EXPECT_TRUE((maybe < 1).undecided());
+  EXPECT_TRUE((maybe > 1).undecided());
+  EXPECT_TRUE((maybe <= 1).undecided());
+  EXPECT_TRUE((maybe >= 1).undecided());
+  EXPECT_TRUE((maybe == 1).undecided());
+  EXPECT_TRUE((maybe != 1).undecided());
 }
 
 TEST(BoundComparison, FlushesDenormalsEitherWay) {

@@ -138,7 +138,7 @@ TEST_P(BoundRounded, IntegersConvertToTheFloatsAroundThem) {
 // ---- errors in ULP and absolute ----
 
 // The floats within max(ulp * ulp(z), absolute) of z; the largest float's neighbour is infinity,
-// and no error in ULP changes a sign (an assumed exception, see rules.h).
+// no error in ULP changes a sign (an assumed exception, see rules.h), and denormals may be flushed.
 Floats permitted(mpfr_ptr z, double ulp, double absolute) {
   static thread_local Real end;
   const double error = std::max(ulp * specifiedUlp(z), absolute);
@@ -151,6 +151,7 @@ Floats permitted(mpfr_ptr z, double ulp, double absolute) {
   if (high == -kInf) high = -kMax;
   if (absolute == 0 && mpfr_sgn(z) >= 0) low = std::max(low, 0.0f);
   if (absolute == 0 && mpfr_sgn(z) <= 0) high = std::min(high, 0.0f);
+  if (inDenormalRange(z)) return {std::min(low, 0.0f), std::max(high, 0.0f)};
   return {low, high};
 }
 

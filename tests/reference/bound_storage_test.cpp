@@ -66,12 +66,15 @@ TEST(BoundStorage, BetweenTwoValuesEitherIsStored) {
   for (const Format& format : kFormats) {
     const std::vector<double> values = valuesOf(format);
     for (std::size_t i = 1; i < values.size(); ++i) {
-      const auto between = static_cast<float>(values[i - 1] + (values[i] - values[i - 1]) * 0.25);
-      const Bounded got = stored(Bounded(between), format.storage);
-      ASSERT_TRUE(is(got, floorToFloat(values[i - 1]), ceilToFloat(values[i]))) << format.name;
-      // A quarter of the way the nearest is the lower one.
-      ASSERT_EQ(decode(encode(between, format.storage), format.storage), values[i - 1])
-          << format.name << ' ' << between;
+      for (const double share : {0.25, 0.75}) {
+        const double exact = values[i - 1] + (values[i] - values[i - 1]) * share;
+        const auto between = static_cast<float>(exact);
+        const Bounded got = stored(Bounded(between), format.storage);
+        ASSERT_TRUE(is(got, floorToFloat(values[i - 1]), ceilToFloat(values[i]))) << format.name;
+        ASSERT_EQ(decode(encode(between, format.storage), format.storage),
+                  share < 0.5 ? values[i - 1] : values[i])
+            << format.name << ' ' << between;
+      }
     }
   }
 }

@@ -146,8 +146,16 @@ TEST_P(EachRoundingOfSums, OfIntervalsHoldEveryPointInside) {
     const double result = multipliedAnyhow(device, x, y);
     const Bounded got = dot(a, b);
     ASSERT_TRUE(got.lo <= result && result <= got.hi) << result << ' ' << got;
-    const Bounded length3 = length(a), point = length(Vec3<Bounded>(x[0], x[1], x[2]));
+    const Vec3<Bounded> inside(x[0], x[1], x[2]);
+    const Bounded length3 = length(a), point = length(inside);
     ASSERT_TRUE(length3.lo <= point.lo && point.hi <= length3.hi) << point << ' ' << length3;
+    const Vec3<Bounded> unit = normalize(a), pointed = normalize(inside);
+    const Vec3<Bounded> mirrored = reflect(a, b),
+                        back = reflect(inside, Vec3<Bounded>(y[0], y[1], y[2]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      ASSERT_TRUE(unit[k].lo <= pointed[k].lo && pointed[k].hi <= unit[k].hi) << unit[k];
+      ASSERT_TRUE(mirrored[k].lo <= back[k].lo && back[k].hi <= mirrored[k].hi) << mirrored[k];
+    }
   }
 }
 
@@ -187,6 +195,13 @@ TEST(BoundVector, NormalizeOfAPointIsTight) {
   const Vec3<Bounded> unit = normalize(Vec3<Bounded>(1, 2, 3));
   const double relative = 2 * 0x1p-23 + rules().gamma(3) / 2 + rules().unitRoundoff();
   EXPECT_LE(unit.x.hi - unit.x.lo, 2 * relative * unit.x.value * 1.01 + ulp(unit.x.value));
+}
+
+// x / |x| of (x, 1, 0) runs from 1 / sqrt(2) to 2 / sqrt(5) for x in [1, 2].
+TEST(BoundVector, NormalizeOfAnIntervalKnowsTheComponentOnBothSidesOfTheQuotient) {
+  const Bounded unit = normalize(Vec3<Bounded>(Bounded::between(1, 2), 1, 0)).x;
+  EXPECT_NEAR(unit.lo, std::sqrt(0.5), 8 * 0x1p-23);
+  EXPECT_NEAR(unit.hi, 2 / std::sqrt(5.0), 8 * 0x1p-23);
 }
 
 TEST(BoundVector, AxisAlignedStaysExact) {

@@ -27,7 +27,8 @@ TEST(GaussLegendre, IntegratesPolynomialsOfDegree2nMinus1) {
 
 TEST(Hemisphere, OfTheCosineIsPiWhateverTheScale) {
   for (const double scale : {0.1, 1.0, 3.0}) {
-    const double integral = hemisphere([](double theta, double) { return std::cos(theta); }, scale, 96);
+    const double integral =
+        hemisphere([](double theta, double) { return std::cos(theta); }, scale, 96);
     EXPECT_LE(std::abs(integral - std::numbers::pi), 1e3 * kEpsilon) << scale;
   }
 }
