@@ -26,7 +26,8 @@ double chiSquareTest(const std::vector<double>& observed, const std::vector<doub
   constexpr double kLeastExpected = 5;
   std::vector<std::size_t> order(expected.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });
+  std::ranges::stable_sort(order,
+                           [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });
   double statistic = 0, bins = 0, pooledObserved = 0, pooledExpected = 0;
   for (const std::size_t bin : order) {
     pooledObserved += observed[bin];

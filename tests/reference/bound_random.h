@@ -21,6 +21,13 @@ inline constexpr float kMin = std::numeric_limits<float>::min();
 inline constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 inline constexpr float kInf = std::numeric_limits<float>::infinity();
 
+// Random arguments of an operation. Sanitizers look at the code, not at the numbers.
+#ifdef GNOMON_SANITIZE
+inline constexpr int kRandomArguments = 20'000;
+#else
+inline constexpr int kRandomArguments = 1'000'000;
+#endif
+
 // 700 bits hold a * b + c for any floats: exponents from 2 * -149 to 256, and 48 + 24 bits more.
 class Real {
  public:

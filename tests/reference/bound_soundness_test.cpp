@@ -54,7 +54,7 @@ TEST_P(BoundRounded, SumDifferenceAndProductOfPointsAreExactlyTheRoundingsOfTheE
   for (const auto& [name, exact, bound] : kRoundedOperations) {
     Arguments arguments(1);
     Real z;
-    for (int i = 0; i < 1000000; ++i) {
+    for (int i = 0; i < kRandomArguments; ++i) {
       const float a = arguments.any(), b = i % 4 == 0 ? arguments.near(a) : arguments.any();
       const Bounded got = bound(a, b, a);
       exact(z, a, b, a);
@@ -99,7 +99,7 @@ TEST_P(BoundRounded, SumDifferenceAndProductOfIntervalsHoldAllResults) {
 TEST_P(BoundRounded, FmaHoldsFusedAndSeparateResultsAndLittleElse) {
   Arguments arguments(3);
   Real exact, twice;
-  for (int i = 0; i < 500000; ++i) {
+  for (int i = 0; i < kRandomArguments; ++i) {
     const float a = arguments.any(), b = arguments.any();
     const float c = i % 2 == 0 ? arguments.any() : arguments.near(a * b);
     const Bounded got = fma(Bounded(a), b, c);
@@ -126,7 +126,7 @@ TEST_P(BoundRounded, FmaHoldsFusedAndSeparateResultsAndLittleElse) {
 TEST_P(BoundRounded, IntegersConvertToTheFloatsAroundThem) {
   Arguments arguments(4);
   Real z;
-  for (int i = 0; i < 100000; ++i) {
+  for (int i = 0; i < kRandomArguments; ++i) {
     const auto x = static_cast<std::int32_t>(arguments.below(0xffffffffU)) >> arguments.below(31);
     mpfr_set_si(z, x, MPFR_RNDN);
     const Floats expected = roundings(z, GetParam());
@@ -210,7 +210,7 @@ float argumentOf(const Function& f, Arguments& arguments) {
 constexpr mpfr_prec_t kBits = 160;
 
 TEST(BoundFunctions, OfPointsHoldThePermittedResultsAndMostlyNothingElse) {
-  constexpr int kCount = 150000;
+  constexpr int kCount = kRandomArguments;
   for (const Function& f : kFunctions) {
     Arguments arguments(5);
     Real x(24), z(kBits);
@@ -269,7 +269,7 @@ float divisorOf(Arguments& arguments) {
 }
 
 TEST(BoundDivision, OfPointsHoldsThePermittedResultsAndAlmostAlwaysNothingElse) {
-  constexpr int kCount = 1000000;
+  constexpr int kCount = kRandomArguments;
   Arguments arguments(7);
   Real z(kBits);
   int exactlyPermitted = 0;
@@ -311,7 +311,7 @@ TEST(BoundDivision, OfIntervalsHoldsThePermittedResultsOfEveryPointInside) {
 TEST(BoundAtan2, HoldsThePermittedResultsInEveryQuadrant) {
   Arguments arguments(9);
   Real z(kBits), x(24);
-  for (int i = 0; i < 100000; ++i) {
+  for (int i = 0; i < kRandomArguments; ++i) {
     const float b = divisorOf(arguments), a = i % 2 == 0 ? arguments.near(b) : divisorOf(arguments);
     if (isDenormal(a)) continue;
     mpfr_set_flt(z, a, MPFR_RNDN);
