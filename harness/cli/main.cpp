@@ -142,7 +142,7 @@ int complain(const char* what, int status) {
 int run(int argc, char** argv) {
   CLI::App app("Says whether a GPU rendering algorithm is right.", "gnomon");
   app.set_version_flag("--version", GNOMON_VERSION);
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);  // required, but an unknown word is the better complaint
   app.footer(kExit);
   Action action;
   addDevices(app, action);
@@ -159,6 +159,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return complain(fmt::format("{}\nSee `gnomon --help`.", error.what()).c_str(), kUsage);
   }
+  if (!action) throw UsageError("which command? See `gnomon --help`.");
   return action();
 }
 

@@ -22,7 +22,7 @@ void expectUsageError(const std::string& arguments, const std::string& culprit) 
 
 TEST(Command, NamesWhatIsWrongWithItsArguments) {
   expectUsageError("no-such-command", "no-such-command");
-  expectUsageError("", "subcommand is required");
+  expectUsageError("", "which command");
   expectUsageError("validate no_such_stage", "no_such_stage");
   expectUsageError("validate --no-such-flag", "no-such-flag");
   expectUsageError("validate --filter 'NoSuch*'", "NoSuch*");
