@@ -10,8 +10,9 @@
 
 namespace gnomon {
 
-Said gnomonSays(const std::string& arguments) {
-  const std::string line = std::string(GNOMON_COMMAND) + " " + arguments + " 2>&1 </dev/null";
+Said gnomonSays(const std::string& arguments, const std::string& streams) {
+  const std::string line =
+      std::string(GNOMON_COMMAND) + " " + arguments + " " + streams + " </dev/null";
   Said said;
   std::FILE* pipe = popen(line.c_str(), "r");
   if (pipe == nullptr) return said;

@@ -8,11 +8,11 @@ namespace gnomon {
 
 struct Said {
   int status = -1;
-  std::string output;  ///< standard output and error together
+  std::string output;  ///< standard output, and error where it goes there
 };
 
-/// `gnomon ARGUMENTS`, through a shell; with a cache folder of the test's own.
-Said gnomonSays(const std::string& arguments);
+/// `gnomon ARGUMENTS`, through a shell; `streams` redirects standard error.
+Said gnomonSays(const std::string& arguments, const std::string& streams = "2>&1");
 
 /// A fresh folder that is removed with the object.
 class Scratch {
