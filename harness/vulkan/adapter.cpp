@@ -87,6 +87,8 @@ void fillLimits(const VkPhysicalDeviceLimits& limits, GpuInfo& info) {
   info.maxSharedBytes = limits.maxComputeSharedMemorySize;
   info.maxPushBytes = limits.maxPushConstantsSize;
   info.maxStorageRange = limits.maxStorageBufferRange;
+  info.maxImageSide = limits.maxImageDimension2D;
+  info.maxImageLayers = limits.maxImageArrayLayers;
 }
 
 GpuInfo describe(const Properties& properties, const FeatureChain& features,
@@ -114,6 +116,7 @@ GpuInfo describe(const Properties& properties, const FeatureChain& features,
 struct Queue {
   std::uint32_t family = 0;
   unsigned timestampBits = 0;
+  bool graphics = false;
 };
 
 /// A family that can draw too where there is one: stages with draws need both.
@@ -126,7 +129,7 @@ std::optional<Queue> computeQueue(VkPhysicalDevice device) {
   for (const VkQueueFlags wanted : {kCompute | VK_QUEUE_GRAPHICS_BIT, kCompute})
     for (std::uint32_t i = 0; i < count; ++i)
       if ((families[i].queueFlags & wanted) == wanted)
-        return Queue{i, families[i].timestampValidBits};
+        return Queue{i, families[i].timestampValidBits, (wanted & VK_QUEUE_GRAPHICS_BIT) != 0};
   return std::nullopt;
 }
 
@@ -154,6 +157,7 @@ std::vector<Adapter> adaptersOf(const Instance& instance) {
     adapter.has13 = apiVersion(device) >= VK_API_VERSION_1_3;
     adapter.queueFamily = queue->family;
     adapter.timestampBits = queue->timestampBits;
+    adapter.graphics = queue->graphics;
     const Properties properties = propertiesOf(device);
     adapter.limits = properties.core.properties.limits;
     adapter.info = describe(properties, featuresOf(device, adapter.has13), queue->timestampBits);

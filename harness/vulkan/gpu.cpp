@@ -25,6 +25,31 @@ GpuBuffer::GpuBuffer(GpuBuffer&&) noexcept = default;
 GpuBuffer& GpuBuffer::operator=(GpuBuffer&&) noexcept = default;
 std::size_t GpuBuffer::size() const { return impl ? impl->size : 0; }
 
+struct GpuImage::Impl {
+  std::shared_ptr<Device> device;  // declared first, as above
+  vulkan::Image image;
+};
+
+GpuImage::GpuImage() = default;
+GpuImage::~GpuImage() = default;
+GpuImage::GpuImage(GpuImage&&) noexcept = default;
+GpuImage& GpuImage::operator=(GpuImage&&) noexcept = default;
+const ImageDescription& GpuImage::description() const {
+  static const ImageDescription none{.width = 0, .height = 0, .layers = 0, .mips = 0};
+  return impl ? impl->image.description : none;
+}
+
+struct GpuSampler::Impl {
+  std::shared_ptr<Device> device;  // declared first, as above
+  vulkan::OwnedSampler sampler;
+  SamplerDescription description;
+};
+
+GpuSampler::GpuSampler() = default;
+GpuSampler::~GpuSampler() = default;
+GpuSampler::GpuSampler(GpuSampler&&) noexcept = default;
+GpuSampler& GpuSampler::operator=(GpuSampler&&) noexcept = default;
+
 struct GpuProgram::Impl {
   vulkan::Program program;
 };
@@ -62,9 +87,51 @@ void requireInside(const GpuBuffer& buffer, std::size_t offset, std::size_t byte
                                         offset + bytes, buffer.size()));
 }
 
+void requireInside(const ImageDescription& image, unsigned layer, unsigned mip) {
+  if (layer >= image.layers || mip >= image.mips)
+    throw std::out_of_range(fmt::format("layer {}, mip {} of a GPU image of {} and {}", layer, mip,
+                                        image.layers, image.mips));
+}
+
+void requireBytes(const ImageDescription& image, unsigned layer, unsigned mip, std::size_t bytes) {
+  requireInside(image, layer, mip);
+  if (bytes != mipBytes(image, mip))
+    throw std::logic_error(fmt::format("{} bytes for mip {} of a GPU image, which has {}", bytes,
+                                       mip, mipBytes(image, mip)));
+}
+
+/// What no device could make, and no driver need refuse.
+void requireSound(const ImageDescription& image) {
+  if (image.width == 0 || image.height == 0 || image.layers == 0 || image.mips == 0)
+    throw std::logic_error(fmt::format("an image of {} x {} pixels, {} layers, {} mips",
+                                       image.width, image.height, image.layers, image.mips));
+  if (image.mips > fullMipCount(image.width, image.height))
+    throw std::logic_error(fmt::format("{} mips of {} x {} pixels, which have {}", image.mips,
+                                       image.width, image.height,
+                                       fullMipCount(image.width, image.height)));
+  if (image.cube && (image.width != image.height || image.layers % 6 != 0))
+    throw std::logic_error(fmt::format("a cube of {} faces of {} x {} pixels", image.layers,
+                                       image.width, image.height));
+}
+
 std::string textOf(const BindingSlot& slot) {
-  return fmt::format("{} buffer of set {}, binding {}", slot.uniform ? "uniform" : "storage",
+  constexpr const char* kKinds[] = {"storage buffer", "uniform buffer", "sampled image",
+                                    "storage image",  "sampler",        "combined image sampler"};
+  return fmt::format("{} of set {}, binding {}", kKinds[static_cast<std::size_t>(slot.kind)],
                      slot.set, slot.binding);
+}
+
+bool takesBuffer(const BindingSlot& slot) {
+  return slot.kind == BindingSlot::Kind::kStorageBuffer ||
+         slot.kind == BindingSlot::Kind::kUniformBuffer;
+}
+
+bool takesImage(const BindingSlot& slot) {
+  return !takesBuffer(slot) && slot.kind != BindingSlot::Kind::kSampler;
+}
+
+bool takesSampler(const BindingSlot& slot) {
+  return slot.kind == BindingSlot::Kind::kSampler || slot.kind == BindingSlot::Kind::kCombined;
 }
 
 /// What is left of a buffer where no range is given. Vulkan has no empty range: one byte stands
@@ -76,8 +143,9 @@ VkDeviceSize rangeOf(const BoundBuffer& bound) {
 }
 
 void requireLimits(const vulkan::Adapter& adapter, const BoundBuffer& bound) {
-  const std::size_t most = bound.slot.uniform ? adapter.limits.maxUniformBufferRange
-                                              : adapter.limits.maxStorageBufferRange;
+  const std::size_t most = bound.slot.kind == BindingSlot::Kind::kUniformBuffer
+                               ? adapter.limits.maxUniformBufferRange
+                               : adapter.limits.maxStorageBufferRange;
   if (rangeOf(bound) > most)
     throw Unsupported(fmt::format("{} bytes in the {}; {} allows {}", rangeOf(bound),
                                   textOf(bound.slot), adapter.info.name, most));
@@ -90,16 +158,49 @@ void requireLimits(const vulkan::Adapter& adapter, const std::array<std::uint32_
                                     adapter.info.name, adapter.info.maxGroupCount[i]));
 }
 
-/// A slot without a buffer, or a push range without values, is undefined behaviour in the driver.
+/// An image and a sampler that a shader joins by itself (kSampledImage and kSampler) are the
+/// validation layer's business: nothing here tells which goes with which.
+void requireUse(const vulkan::Adapter& adapter, const vulkan::Image& image, BindingSlot::Kind kind,
+                const SamplerDescription& sampler) {
+  const auto require = [&](VkFormatFeatureFlags feature, const char* use) {
+    if ((image.features & feature) == 0)
+      throw Unsupported(fmt::format("{} of {} is not supported by {}", use,
+                                    nameOf(image.description.format), adapter.info.name));
+  };
+  if (kind == BindingSlot::Kind::kStorageImage)
+    require(VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT, "storage image");
+  if (kind != BindingSlot::Kind::kCombined) return;
+  if (sampler.linear || sampler.linearMips)
+    require(VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT, "linear filtering");
+  if (sampler.reduction != SamplerDescription::Reduction::kAverage)
+    require(VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_MINMAX_BIT, "min/max filtering");
+}
+
+/// A slot without a buffer or image, or a push range without values, is undefined behaviour in the
+/// driver.
 void requireComplete(const vulkan::Program& program, const Dispatch& dispatch) {
   if (dispatch.push.size() != program.pushBytes)
     throw std::logic_error(fmt::format("{} bytes of push constants for a program of {}",
                                        dispatch.push.size(), program.pushBytes));
   for (const BindingSlot& slot : program.slots)
-    if (std::ranges::count(dispatch.buffers, slot, &BoundBuffer::slot) != 1)
+    if ((takesBuffer(slot) ? std::ranges::count(dispatch.buffers, slot, &BoundBuffer::slot)
+                           : std::ranges::count(dispatch.images, slot, &BoundImage::slot)) != 1)
       throw std::logic_error(fmt::format("the {} must be bound once", textOf(slot)));
-  if (dispatch.buffers.size() != program.slots.size())
-    throw std::logic_error("a buffer is bound where the program has no slot");
+  if (dispatch.buffers.size() + dispatch.images.size() != program.slots.size())
+    throw std::logic_error("a buffer or image is bound where the program has no slot");
+  for (const BoundImage& bound : dispatch.images)
+    if (takesImage(bound.slot) != (bound.image != nullptr) ||
+        takesSampler(bound.slot) != (bound.sampler != nullptr))
+      throw std::logic_error(fmt::format("the {} takes {} and {}", textOf(bound.slot),
+                                         takesImage(bound.slot) ? "an image" : "no image",
+                                         takesSampler(bound.slot) ? "a sampler" : "no sampler"));
+}
+
+/// The mip levels that a kernel sees; -1: all. A storage image has only one.
+int mipOf(const BoundImage& bound) {
+  if (bound.mip >= 0)
+    requireInside(bound.image->description(), 0, static_cast<unsigned>(bound.mip));
+  return bound.mip < 0 && bound.slot.kind == BindingSlot::Kind::kStorageImage ? 0 : bound.mip;
 }
 
 }  // namespace
@@ -137,6 +238,42 @@ void Gpu::fill(const GpuBuffer& buffer, std::uint32_t pattern) {
   if (buffer.size() > 0) impl->device->fill(buffer.impl->buffer, pattern);
 }
 
+GpuImage Gpu::allocateImage(const ImageDescription& description) {
+  requireSound(description);
+  GpuImage image;
+  image.impl = std::make_unique<GpuImage::Impl>();
+  image.impl->device = impl->device;
+  image.impl->image = impl->device->makeImage(description);
+  return image;
+}
+
+void Gpu::uploadImage(const GpuImage& to, unsigned layer, unsigned mip,
+                      std::span<const std::byte> tightRows) {
+  requireBytes(to.description(), layer, mip, tightRows.size());
+  impl->device->upload(to.impl->image, layer, mip, tightRows);
+}
+
+void Gpu::downloadImage(const GpuImage& from, unsigned layer, unsigned mip,
+                        std::span<std::byte> tightRows) {
+  requireBytes(from.description(), layer, mip, tightRows.size());
+  impl->device->download(from.impl->image, layer, mip, tightRows);
+}
+
+void Gpu::fillImage(const GpuImage& image, const std::array<std::byte, 16>& pixelPattern) {
+  impl->device->fill(image.impl->image, pixelPattern);
+}
+
+GpuSampler Gpu::makeSampler(const SamplerDescription& description) {
+  if (description.compare && description.reduction != SamplerDescription::Reduction::kAverage)
+    throw std::logic_error("a sampler compares or takes the smallest or largest, not both");
+  GpuSampler sampler;
+  sampler.impl = std::make_unique<GpuSampler::Impl>();
+  sampler.impl->device = impl->device;
+  sampler.impl->sampler = impl->device->makeSampler(description);
+  sampler.impl->description = description;
+  return sampler;
+}
+
 GpuProgram Gpu::build(const ProgramDescription& description) {
   GpuProgram program;
   program.impl = std::make_unique<GpuProgram::Impl>();
@@ -157,6 +294,18 @@ std::vector<double> Gpu::run(std::span<const Dispatch> dispatches,
       requireLimits(impl->device->adapter, bound);
       command.buffers.push_back(
           {bound.slot, {bound.buffer->impl->buffer.buffer.get(), bound.offset, rangeOf(bound)}});
+    }
+    for (const BoundImage& bound : dispatch.images) {
+      vulkan::BoundView& view = command.images.emplace_back();
+      view.slot = bound.slot;
+      view.image.imageLayout = VK_IMAGE_LAYOUT_GENERAL;
+      if (bound.sampler != nullptr) view.image.sampler = bound.sampler->impl->sampler.get();
+      if (bound.image == nullptr) continue;
+      vulkan::Image& image = bound.image->impl->image;
+      requireUse(
+          impl->device->adapter, image, bound.slot.kind,
+          bound.sampler == nullptr ? SamplerDescription{} : bound.sampler->impl->description);
+      view.image.imageView = impl->device->viewOf(image, {mipOf(bound), bound.asArray});
     }
   }
   if (commands.empty()) return {};

@@ -1,4 +1,5 @@
-// The only door to Vulkan: devices, buffers, programs, dispatches, timestamps, validation messages.
+// The only door to Vulkan: devices, buffers, images, programs, dispatches, timestamps, validation
+// messages.
 // No Vulkan type appears here, so no other folder needs a Vulkan header.
 #pragma once
 
@@ -34,6 +35,8 @@ struct GpuInfo {
   unsigned maxSharedBytes = 0;
   unsigned maxPushBytes = 0;
   std::size_t maxStorageRange = 0;
+  unsigned maxImageSide = 0;    ///< pixels, of an image that is no cube
+  unsigned maxImageLayers = 0;  ///< a format may allow fewer
   /// Optional features by the names of the Vulkan structures ("shaderFloat64",
   /// "scalarBlockLayout", "drawIndirectCount"), and "timestamps", "subgroupBasic", "subgroupVote",
   /// "subgroupArithmetic", "subgroupBallot", "subgroupShuffle", "subgroupShuffleRelative",
@@ -70,11 +73,98 @@ class GpuBuffer {
   std::unique_ptr<Impl> impl;
 };
 
+/// How a pixel is stored; a multi-channel pixel holds R first. The number is of bits a channel,
+/// normalised to [0, 1] but for f (IEEE float), ui (unsigned integer) and D32 (float depth).
+enum class PixelFormat {
+  kRgba8,
+  kR8,
+  kRgba16f,
+  kRg16f,
+  kR16f,
+  kRgba32f,
+  kRg32f,
+  kR32f,
+  kR32ui,
+  kD32,
+};
+
+unsigned bytesPerPixel(PixelFormat format);
+unsigned channels(PixelFormat format);
+const char* nameOf(PixelFormat format);  ///< "RGBA16F", for messages
+
+struct ImageDescription {
+  PixelFormat format = PixelFormat::kRgba8;
+  unsigned width = 1;
+  unsigned height = 1;
+  unsigned layers = 1;  ///< of a cube: its faces, +X -X +Y -Y +Z -Z; a multiple of six
+  unsigned mips = 1;
+  bool cube = false;
+};
+
+/// Width and height of a mip level: max(1, floor(size / 2^mip)).
+std::array<unsigned, 2> mipSize(const ImageDescription& image, unsigned mip);
+/// Bytes of one mip level of one layer, its rows tight.
+std::size_t mipBytes(const ImageDescription& image, unsigned mip);
+/// Mip levels of such an image down to 1 x 1.
+unsigned fullMipCount(unsigned width, unsigned height);
+
+/// A two-dimensional image, array or cube map on the device. Moves; frees itself. Kernels may
+/// sample it, and store to it where the device can store to its format.
+class GpuImage {
+ public:
+  GpuImage();
+  ~GpuImage();
+  GpuImage(GpuImage&&) noexcept;
+  GpuImage& operator=(GpuImage&&) noexcept;
+  const ImageDescription& description() const;
+
+ private:
+  friend class Gpu;
+  struct Impl;
+  std::unique_ptr<Impl> impl;
+};
+
+struct SamplerDescription {
+  enum class Address { kClamp, kRepeat, kMirror };  ///< clamp: to the edge
+  enum class Reduction { kAverage, kMin, kMax };
+
+  bool linear = false;      ///< between texels; else the nearest
+  bool linearMips = false;  ///< between mip levels; else the nearest
+  Address address = Address::kClamp;
+  /// 1 where the reference >= the texel, else 0: less of a distance passes where depth is reversed.
+  bool compare = false;
+  /// Of the texels that the filter touches; the smallest and the largest need samplerFilterMinmax.
+  Reduction reduction = Reduction::kAverage;
+};
+
+/// Moves; frees itself.
+class GpuSampler {
+ public:
+  GpuSampler();
+  ~GpuSampler();
+  GpuSampler(GpuSampler&&) noexcept;
+  GpuSampler& operator=(GpuSampler&&) noexcept;
+
+ private:
+  friend class Gpu;
+  struct Impl;
+  std::unique_ptr<Impl> impl;
+};
+
 /// What a compute pipeline binds at one place.
 struct BindingSlot {
+  enum class Kind {
+    kStorageBuffer,
+    kUniformBuffer,
+    kSampledImage,  ///< texture2D: an image that a kernel joins with a sampler, or fetches from
+    kStorageImage,  ///< image2D
+    kSampler,       ///< sampler
+    kCombined,      ///< sampler2D: an image and its sampler
+  };
+
   unsigned set = 0;
   unsigned binding = 0;
-  bool uniform = false;  ///< uniform buffer instead of storage buffer
+  Kind kind = Kind::kStorageBuffer;
   auto operator<=>(const BindingSlot&) const = default;
 };
 
@@ -112,10 +202,25 @@ struct BoundBuffer {
   std::size_t range = kWholeBuffer;
 };
 
+/// One image, sampler, or both, bound for a dispatch. The kernel sees the image as what it is: 2D,
+/// a 2D array if it has several layers, a cube map, or an array of them.
+struct BoundImage {
+  BindingSlot slot;
+  const GpuImage* image = nullptr;      ///< none at a kSampler
+  const GpuSampler* sampler = nullptr;  ///< only at a kSampler or kCombined
+  /// The mip level that the kernel sees as level 0, its only one. -1: all of them, or the first in
+  /// a storage image, which has only one.
+  int mip = -1;
+  /// Seen as a 2D array (texture2DArray, image2DArray) also where it has one layer or is a cube.
+  bool asArray = false;
+};
+
+/// For each of the program's slots one of its buffers or images.
 struct Dispatch {
   const GpuProgram* program = nullptr;
-  std::vector<BoundBuffer> buffers{};  ///< one for each of the program's slots
-  std::vector<std::byte> push{};       ///< exactly the program's pushBytes
+  std::vector<BoundBuffer> buffers{};
+  std::vector<BoundImage> images{};
+  std::vector<std::byte> push{};  ///< exactly the program's pushBytes
   std::array<std::uint32_t, 3> groups{1, 1, 1};
 };
 
@@ -150,6 +255,24 @@ class Gpu {
   /// Repeats a 32-bit pattern over the whole buffer.
   void fill(const GpuBuffer& buffer, std::uint32_t pattern);
 
+  /// An image of undefined content. Throws Unsupported where the device has no such images (its
+  /// format, sides, layers), std::logic_error where nothing has (no pixels, more mip levels than
+  /// down to 1 x 1, a cube without six square faces), and GpuError when memory is out.
+  GpuImage allocateImage(const ImageDescription& description);
+  /// One mip level of one layer at once, its rows tight and the first one first; mipBytes() of
+  /// them, else std::logic_error. Throws std::out_of_range past the last layer or mip level. Bits
+  /// stay what they are, but depths must lie in [0, 1] (Vulkan's rule for copies into D32).
+  void uploadImage(const GpuImage& to, unsigned layer, unsigned mip,
+                   std::span<const std::byte> tightRows);
+  void downloadImage(const GpuImage& from, unsigned layer, unsigned mip,
+                     std::span<std::byte> tightRows);
+  /// Repeats one pixel, the first bytesPerPixel() bytes of the pattern, over every layer and mip.
+  void fillImage(const GpuImage& image, const std::array<std::byte, 16>& pixelPattern);
+
+  /// Throws Unsupported for a smallest or largest where the device lacks samplerFilterMinmax, and
+  /// std::logic_error for one that also compares.
+  GpuSampler makeSampler(const SamplerDescription& description);
+
   /// Validates the module and builds the pipeline. Throws UsageError (invalid SPIR-V), Unsupported
   /// (more sets or push constants than the device has) or GpuError (the driver refuses). That the
   /// slots cover what the entry point uses is the caller's promise; reflect() tells.
@@ -158,8 +281,9 @@ class Gpu {
   /// Runs the dispatches in order with full memory barriers between them and waits, at most
   /// `limit`. Returns the GPU time of each in nanoseconds (0 without timestamps). Throws GpuError
   /// on device loss or when the limit passes (the device is then unusable: see alive()),
-  /// Unsupported past a limit of the device (groups, bytes in a binding), and std::logic_error
-  /// where buffers or push constants are not those of the program.
+  /// Unsupported past a limit of the device (groups, bytes in a binding, storing to a format,
+  /// filtering one through a kCombined), and std::logic_error where buffers, images or push
+  /// constants are not those of the program.
   std::vector<double> run(std::span<const Dispatch> dispatches, std::chrono::milliseconds limit);
 
   /// False once the device was lost or a wait ran out; a new Gpu is needed. What belongs to a

@@ -1,10 +1,10 @@
 // Inside harness/vulkan: the instance, the device, what it owns. No other folder includes this.
 //
-// Where things go that are not here yet: images and samplers are further Owned handles beside
-// Buffer (memory.cpp), and further descriptor types in descriptorType() (program.cpp) and
-// DescriptorNeeds (run.cpp); graphics pipelines are further programs that run.cpp records.
+// Where things go that are not here yet: graphics pipelines are further programs that run.cpp
+// records; what they draw to are images (image.cpp) with a further usage.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -85,6 +85,7 @@ struct Adapter {
   bool has13 = false;
   std::uint32_t queueFamily = 0;
   unsigned timestampBits = 0;  ///< of its queue; 0: no timestamps
+  bool graphics = false;       ///< its queue can draw too
 };
 
 /// In the loader's order.
@@ -137,6 +138,9 @@ class Owned {
 
 using OwnedMemory = Owned<VkDeviceMemory, vkFreeMemory>;
 using OwnedBuffer = Owned<VkBuffer, vkDestroyBuffer>;
+using OwnedImage = Owned<VkImage, vkDestroyImage>;
+using OwnedImageView = Owned<VkImageView, vkDestroyImageView>;
+using OwnedSampler = Owned<VkSampler, vkDestroySampler>;
 using OwnedCommandPool = Owned<VkCommandPool, vkDestroyCommandPool>;
 using OwnedFence = Owned<VkFence, vkDestroyFence>;
 using OwnedQueryPool = Owned<VkQueryPool, vkDestroyQueryPool>;
@@ -152,6 +156,24 @@ struct Buffer {
   OwnedBuffer buffer;
   std::byte* mapped = nullptr;  ///< where the host sees the memory; null: it does not
   VkDeviceSize bytes = 0;       ///< of the VkBuffer; a multiple of four, never 0
+};
+
+/// An image with memory of its own. It is in VK_IMAGE_LAYOUT_GENERAL from its creation on, the one
+/// layout that allows every use, so that no use depends on the one before it: a judge wants no
+/// state that can be wrong. Some GPUs compress images less in it: whoever compares a benchmark with
+/// an engine's numbers should know.
+struct Image {
+  OwnedMemory memory;  // declared first: views go before their image, and that before its memory
+  OwnedImage image;
+  ImageDescription description;
+  VkFormatFeatureFlags features = 0;  ///< what the device can do with the format
+
+  struct View {
+    int mip = -1;  ///< -1: all
+    bool asArray = false;
+    auto operator<=>(const View&) const = default;
+  };
+  std::map<View, OwnedImageView> views;  ///< made when first bound
 };
 
 /// The device, its queue, and one command buffer that is recorded and waited for at once.
@@ -174,11 +196,19 @@ class Device {
   void download(const Buffer& from, std::size_t offset, std::span<std::byte> data);
   void fill(const Buffer& buffer, std::uint32_t pattern);
 
+  Image makeImage(const ImageDescription& description);
+  void upload(const Image& to, unsigned layer, unsigned mip, std::span<const std::byte> rows);
+  void download(const Image& from, unsigned layer, unsigned mip, std::span<std::byte> rows);
+  void fill(const Image& image, const std::array<std::byte, 16>& pixel);
+  VkImageView viewOf(Image& image, const Image::View& wanted);
+  OwnedSampler makeSampler(const SamplerDescription& description);
+
   DeviceHandle owner;  // declared first: destroyed last
   const Adapter adapter;
 
  private:
   std::uint32_t memoryType(std::uint32_t allowed, Memory where) const;
+  OwnedMemory allocate(VkDeviceSize bytes, std::uint32_t type);
   const Buffer& staging();
 
   bool staged = false;
@@ -192,6 +222,15 @@ class Device {
 
 /// Makes every write so far visible to everything after it, on the device.
 void fullBarrier(VkCommandBuffer commands);
+
+// ---- memory.cpp, image.cpp -----------------------------------------------------------------
+
+/// Large enough that a round trip (tens of microseconds) is small beside the copy.
+inline constexpr std::size_t kStagingBytes = 16u << 20;
+
+/// No transfer takes that long: a staging buffer at 1 GB/s needs 16 ms, and a software device fills
+/// at more than 1 GB/s. Whoever waits longer waits for a device that is gone.
+inline constexpr std::chrono::seconds kTransferLimit{60};
 
 // ---- program.cpp ---------------------------------------------------------------------------
 
@@ -217,9 +256,15 @@ struct BoundRange {
   VkDescriptorBufferInfo buffer{};
 };
 
+struct BoundView {
+  BindingSlot slot;
+  VkDescriptorImageInfo image{};
+};
+
 struct Command {
   const Program* program = nullptr;
   std::vector<BoundRange> buffers;
+  std::vector<BoundView> images;
   const Dispatch* dispatch = nullptr;
 };
 

@@ -16,13 +16,6 @@
 namespace gnomon::vulkan {
 namespace {
 
-// Large enough that a round trip (tens of microseconds) is small beside the copy.
-constexpr std::size_t kStagingBytes = 16u << 20;
-
-// No transfer takes that long: a staging buffer at 1 GB/s needs 16 ms, and a software device fills
-// at more than 1 GB/s. Whoever waits longer waits for a device that is gone.
-constexpr std::chrono::seconds kTransferLimit{60};
-
 constexpr VkBufferUsageFlags kUsage =
     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT |
     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
@@ -44,16 +37,6 @@ OwnedBuffer bareBuffer(Device& device, VkDeviceSize bytes) {
   return {device.owner, made};
 }
 
-OwnedMemory allocate(Device& device, VkDeviceSize bytes, std::uint32_t type) {
-  VkMemoryAllocateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-  info.allocationSize = bytes;
-  info.memoryTypeIndex = type;
-  VkDeviceMemory made = VK_NULL_HANDLE;
-  device.check(vkAllocateMemory(device.owner.handle, &info, nullptr, &made), "vkAllocateMemory");
-  return {device.owner, made};
-}
-
 void copy(Device& device, VkBuffer from, VkBuffer to, const VkBufferCopy& region) {
   const VkCommandBuffer commands = device.begin();
   vkCmdCopyBuffer(commands, from, to, 1, &region);
@@ -71,7 +54,17 @@ std::uint32_t Device::memoryType(std::uint32_t allowed, Memory where) const {
       const VkMemoryPropertyFlags has = memory.memoryTypes[i].propertyFlags;
       if ((allowed >> i & 1) != 0 && (has & wanted) == wanted) return i;
     }
-  throw GpuError("the device has no memory type for a buffer");
+  throw GpuError("the device has no memory type for a buffer or image");
+}
+
+OwnedMemory Device::allocate(VkDeviceSize bytes, std::uint32_t type) {
+  VkMemoryAllocateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+  info.allocationSize = bytes;
+  info.memoryTypeIndex = type;
+  VkDeviceMemory made = VK_NULL_HANDLE;
+  check(vkAllocateMemory(owner.handle, &info, nullptr, &made), "vkAllocateMemory");
+  return {owner, made};
 }
 
 Buffer Device::makeBuffer(std::size_t bytes, Memory where) {
@@ -82,7 +75,7 @@ Buffer Device::makeBuffer(std::size_t bytes, Memory where) {
   VkMemoryRequirements needs{};
   vkGetBufferMemoryRequirements(owner.handle, buffer.buffer.get(), &needs);
   const std::uint32_t type = memoryType(needs.memoryTypeBits, where);
-  buffer.memory = allocate(*this, needs.size, type);
+  buffer.memory = allocate(needs.size, type);
   check(vkBindBufferMemory(owner.handle, buffer.buffer.get(), buffer.memory.get(), 0),
         "vkBindBufferMemory");
   const bool mappable =

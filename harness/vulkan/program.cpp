@@ -118,7 +118,21 @@ OwnedPipeline makePipeline(Device& device, const ProgramDescription& description
 }  // namespace
 
 VkDescriptorType descriptorType(const BindingSlot& slot) {
-  return slot.uniform ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  switch (slot.kind) {
+    case BindingSlot::Kind::kStorageBuffer:
+      return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    case BindingSlot::Kind::kUniformBuffer:
+      return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+    case BindingSlot::Kind::kSampledImage:
+      return VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
+    case BindingSlot::Kind::kStorageImage:
+      return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+    case BindingSlot::Kind::kSampler:
+      return VK_DESCRIPTOR_TYPE_SAMPLER;
+    case BindingSlot::Kind::kCombined:
+      return VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER;
+  }
+  return VK_DESCRIPTOR_TYPE_MAX_ENUM;  // no such kind
 }
 
 Program makeProgram(std::shared_ptr<Device> device, const ProgramDescription& description) {

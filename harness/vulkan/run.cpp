@@ -72,15 +72,17 @@ std::vector<VkDescriptorSet> Runner::describe(const Command& command) {
                 "vkAllocateDescriptorSets");
 
   std::vector<VkWriteDescriptorSet> writes;
-  for (const BoundRange& bound : command.buffers) {
+  const auto writeTo = [&](const BindingSlot& slot) -> VkWriteDescriptorSet& {
     VkWriteDescriptorSet& write = writes.emplace_back();
     write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-    write.dstSet = sets[bound.slot.set];
-    write.dstBinding = bound.slot.binding;
+    write.dstSet = sets[slot.set];
+    write.dstBinding = slot.binding;
     write.descriptorCount = 1;
-    write.descriptorType = descriptorType(bound.slot);
-    write.pBufferInfo = &bound.buffer;
-  }
+    write.descriptorType = descriptorType(slot);
+    return write;
+  };
+  for (const BoundRange& bound : command.buffers) writeTo(bound.slot).pBufferInfo = &bound.buffer;
+  for (const BoundView& bound : command.images) writeTo(bound.slot).pImageInfo = &bound.image;
   vkUpdateDescriptorSets(device->owner.handle, static_cast<std::uint32_t>(writes.size()),
                          writes.data(), 0, nullptr);
   return sets;

@@ -48,8 +48,8 @@ ProgramDescription describe(const std::string& body, std::vector<BindingSlot> sl
   return description;
 }
 
-constexpr BindingSlot kFirst{0, 0, false};
-constexpr BindingSlot kSecond{0, 1, false};
+constexpr BindingSlot kFirst{0, 0};
+constexpr BindingSlot kSecond{0, 1};
 
 template <typename T>
 std::vector<std::byte> bytesOf(const T& value) {
@@ -235,7 +235,7 @@ TEST_P(GpuTest, PushAndSpecializationConstantsReachTheKernel) {
 }
 
 TEST_P(GpuTest, UniformBuffersAndSetsWithGapsAreBound) {
-  const BindingSlot uniform{2, 4, true};
+  const BindingSlot uniform{2, 4, BindingSlot::Kind::kUniformBuffer};
   const GpuProgram program = gpu->build(describe(R"(
     layout(local_size_x = 1) in;
     layout(set = 2, binding = 4) uniform Settings { uvec4 values; } settings;
@@ -315,7 +315,7 @@ TEST_P(GpuTest, InvalidSpirvNeverReachesTheDriver) {
 
 TEST_P(GpuTest, WhatTheDeviceCannotDoIsUnsupported) {
   ProgramDescription description = describe(kIncrement, {kFirst});
-  description.slots = {{999, 0, false}};
+  description.slots = {BindingSlot{999, 0}};
   EXPECT_THROW(gpu->build(description), Unsupported);
   description.slots = {kFirst};
   description.pushBytes = gpu->info().maxPushBytes + 4;
