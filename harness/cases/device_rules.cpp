@@ -1,5 +1,7 @@
 #include "harness/cases/device_rules.h"
 
+#include <unistd.h>
+
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
@@ -25,6 +27,9 @@ MeasuredError parseOne(const nlohmann::json& entry, const std::string& where) {
   for (const char* key : {"ulp", "absolute"})
     if (!entry.is_object() || !entry.contains(key) || !entry[key].is_number())
       throw UsageError(fmt::format("{}: \"{}\" is not a number", where, key));
+  for (const char* key : {"ulp", "absolute"})
+    if (const double x = entry[key]; !(x >= 0 && x < 1e6))
+      throw UsageError(fmt::format("{}: {} is no error of an operation", where, x));
   return {.worst = {entry["ulp"], entry["absolute"]},
           .worstAt = entry.value("worstAt", 0.0),
           .arguments = entry.value("arguments", std::size_t{0}),
@@ -72,10 +77,19 @@ std::optional<DeviceErrors> loadDeviceErrors(const GpuInfo& gpu, const fs::path&
 }
 
 void cacheDeviceErrors(const GpuInfo& gpu, const DeviceErrors& errors) {
-  const fs::path folder = cacheFolder();
+  const fs::path folder = cacheFolder(), file = folder / (deviceKey(gpu) + ".json");
   std::error_code error;
   fs::create_directories(folder, error);
-  if (!error) std::ofstream(folder / (deviceKey(gpu) + ".json")) << deviceErrorsJson(gpu, errors);
+  // Renamed into place, so that a run beside this one never reads half a file.
+  const fs::path draft = file.string() + "." + std::to_string(getpid());
+  std::ofstream(draft) << deviceErrorsJson(gpu, errors);
+  fs::rename(draft, file, error);
+}
+
+void merge(DeviceErrors& known, Operation operation, const MeasuredError& error) {
+  const auto found = known.find(operation);
+  if (found == known.end() || error.exhaustive || !found->second.exhaustive)
+    known[operation] = error;
 }
 
 std::string deviceErrorsJson(const GpuInfo& gpu, const DeviceErrors& errors) {

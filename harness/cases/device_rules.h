@@ -29,6 +29,9 @@ std::string deviceKey(const GpuInfo& gpu);
 /// is there and cannot be understood.
 std::optional<DeviceErrors> loadDeviceErrors(const GpuInfo& gpu, const std::filesystem::path& root);
 
+/// Takes in one operation's error; a sample never replaces what was measured over every float.
+void merge(DeviceErrors& known, Operation operation, const MeasuredError& error);
+
 /// Writes to the user's cache; a cache that cannot be written is no error.
 void cacheDeviceErrors(const GpuInfo& gpu, const DeviceErrors& errors);
 

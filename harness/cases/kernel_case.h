@@ -26,8 +26,11 @@ class KernelCase : public testing::Test {
   /// Skips the case as unsupported where the device lacks what the kernel needs.
   void SetUp() override;
 
-  /// Runs the kernel under every check of hygiene; what hygiene finds fails the case.
+  /// Runs the kernel under every check of hygiene; the findings go to the verdict.
   Observation run(Stimulus stimulus);
+
+  /// For laws, which judge without a verdict: fails the case with what hygiene found.
+  void expectClean(const Observation& seen);
 
   /// Judges one output and records the verdict. A kernel of the project must conform; a verdict of
   /// wrong, or outside the device's measured errors, fails the case with an explanation.

@@ -144,6 +144,8 @@ void runCases(Session& session, const std::vector<CaseName>& cases, const Observ
     // The records say more than GoogleTest's own status.
     [[maybe_unused]] const int status = RUN_ALL_TESTS();
   }
+  if (session.cases().size() != cases.size())
+    throw std::logic_error(fmt::format("{} of {} cases ran", session.cases().size(), cases.size()));
 }
 
 }  // namespace gnomon

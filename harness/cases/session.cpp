@@ -1,5 +1,6 @@
 #include "harness/cases/session.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "harness/error.h"
@@ -66,15 +67,24 @@ SpirvWords Session::load(const std::filesystem::path& file, const KernelRecord& 
 const Bounds& Session::bounds() {
   if (!rules) {
     rules = Bounds::specification(gpu().info().roundingRteFloat32);
-    DeviceErrors known = loadDeviceErrors(gpu().info(), settings.root).value_or(DeviceErrors{});
-    for (const auto& [operation, error] : errors) known[operation] = error;
-    if (!known.empty()) rules->device = deviceRules(rules->spec, known);
+    if (!deviceErrors().empty()) rules->device = deviceRules(rules->spec, deviceErrors());
   }
   return *rules;
 }
 
+const DeviceErrors& Session::deviceErrors() {
+  if (!errors) errors = loadDeviceErrors(gpu().info(), settings.root).value_or(DeviceErrors{});
+  return *errors;
+}
+
 void Session::measured(Operation operation, const MeasuredError& error) {
-  errors[operation] = error;
+  // A few arguments, or somebody's own kernel, say nothing about the device.
+  const bool foreign = std::ranges::any_of(
+      settings.kernels, [](const auto& k) { return k.first.starts_with("precision/"); });
+  if (settings.cases || foreign) return;
+  deviceErrors();
+  merge(*errors, operation, error);
+  measuredAny = true;
   rules.reset();
 }
 

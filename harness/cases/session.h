@@ -62,8 +62,9 @@ class Session {
 
   /// Takes in what a case has measured; from now on part of bounds().
   void measured(Operation operation, const MeasuredError& error);
-  /// What this run has measured so far.
-  const DeviceErrors& measurements() const { return errors; }
+  /// What is known of this device: measured before, and by this run.
+  const DeviceErrors& deviceErrors();
+  bool hasMeasured() const { return measuredAny; }
 
   /// Time limit of one wait for the device.
   std::chrono::milliseconds limit() const;
@@ -79,7 +80,8 @@ class Session {
   Policy choices;
   std::unique_ptr<Gpu> device;
   std::optional<Bounds> rules;
-  DeviceErrors errors;
+  std::optional<DeviceErrors> errors;
+  bool measuredAny = false;
   std::map<std::string, std::unique_ptr<Subject>> subjects;
   std::vector<CaseRecord> records;
 };

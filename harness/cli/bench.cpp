@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
+#include <regex>
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -96,8 +97,14 @@ bool slowerThan(const Times& before, const Times& now, double allowed, Terminal&
                     terminal.paint(ratio > allowed ? Colour::kRed : Colour::kGreen,
                                    fmt::format("{:.2f}", ratio))});
   }
+  for (const auto& [name, ns] : before)
+    if (!now.contains(name)) {
+      rows.push_back({name, fmt::format("{:.2f} us", ns / 1000), "none", ""});
+      slower = true;
+    }
   terminal.print(table(rows, "lrrr"));
-  if (slower) terminal.print(fmt::format("slower than the baseline by more than {:.2f}", allowed));
+  if (slower)
+    terminal.print(fmt::format("slower than the baseline by more than {:.2f}, or gone", allowed));
   return slower;
 }
 
@@ -118,8 +125,11 @@ int bench(const BenchOptions& given) {
   BenchOptions options = given;
   options.session.root = sourceRoot();
   options.session.validation = false;  // its layer costs time that is not the kernel's
-  const Times before = options.baseline.empty() ? Times{} : readBaseline(options.baseline);
   const std::string filter = pattern(options.stages);
+  Times before = options.baseline.empty() ? Times{} : readBaseline(options.baseline);
+  std::erase_if(before, [chosen = std::regex(filter)](const auto& b) {
+    return !std::regex_search(b.first, chosen);
+  });
   Session session(options.session);
   Terminal terminal(options.json == "-" ? stderr : stdout);
   terminal.print(fmt::format("{}, {}", session.gpu().info().name, session.gpu().info().driver));

@@ -33,18 +33,22 @@ struct Output {
   std::size_t dataBytes() const { return elements * spec->element.size; }
 };
 
-/// The stimulus as device buffers; inputs are uploaded once and used by every run.
+/// One input buffer: elements, guard.
+struct Input {
+  const BufferSpec* spec;
+  std::span<const std::byte> bytes;
+  GpuBuffer buffer;
+};
+
+/// The stimulus as device buffers.
 struct Setup {
-  std::vector<GpuBuffer> inputs;
+  std::vector<Input> inputs;
   std::vector<Output> outputs;
   Dispatch dispatch;
 };
 
 void addInput(Setup& setup, Gpu& gpu, const BufferSpec& spec, std::span<const std::byte> bytes) {
-  GpuBuffer buffer = gpu.allocate(bytes.size() + kGuardBytes);
-  gpu.fill(buffer, kPoison[0]);
-  gpu.upload(buffer, 0, bytes);
-  setup.inputs.push_back(std::move(buffer));
+  setup.inputs.push_back({&spec, bytes, gpu.allocate(bytes.size() + kGuardBytes)});
   setup.dispatch.buffers.push_back(
       {.slot = {.set = 0, .binding = spec.binding}, .range = bytes.size() + kGuardBytes});
 }
@@ -62,7 +66,7 @@ void addOutput(Setup& setup, Gpu& gpu, const BufferSpec& spec, std::size_t eleme
 // Buffers move while the lists grow, so the dispatch learns their addresses last.
 void bindAddresses(Setup& setup) {
   std::size_t slot = 0;
-  for (const GpuBuffer& b : setup.inputs) setup.dispatch.buffers[slot++].buffer = &b;
+  for (const Input& in : setup.inputs) setup.dispatch.buffers[slot++].buffer = &in.buffer;
   for (const Output& o : setup.outputs) setup.dispatch.buffers[slot++].buffer = &o.buffer;
 }
 
@@ -81,14 +85,20 @@ Setup prepare(const Subject& subject, const Stimulus& stimulus) {
 
 using Bytes = std::vector<std::byte>;
 
+void uploadInputs(Gpu& gpu, const Setup& setup) {
+  for (const Input& in : setup.inputs) {
+    gpu.fill(in.buffer, kPoison[0]);
+    gpu.upload(in.buffer, 0, in.bytes);
+  }
+}
+
 /// One run: whole buffers, guards included, in the order of setup.outputs.
 std::vector<Bytes> runOnce(const Subject& subject, Setup& setup, const GpuProgram& program,
-                           std::uint32_t poison, std::chrono::milliseconds limit, double* ns) {
+                           std::uint32_t poison, std::chrono::milliseconds limit) {
   Gpu& gpu = subject.gpu();
   for (const Output& o : setup.outputs) gpu.fill(o.buffer, poison);
   setup.dispatch.program = &program;
-  const double time = gpu.run({&setup.dispatch, 1}, limit).front();
-  if (ns != nullptr) *ns = *ns == 0 ? time : std::min(*ns, time);
+  gpu.run({&setup.dispatch, 1}, limit);
   std::vector<Bytes> all;
   for (const Output& o : setup.outputs) {
     all.emplace_back(o.buffer.size());
@@ -97,14 +107,31 @@ std::vector<Bytes> runOnce(const Subject& subject, Setup& setup, const GpuProgra
   return all;
 }
 
-std::string where(const Output& out, std::size_t byteInData) {
-  const unsigned stride = out.spec->element.size;
+std::string where(const BufferSpec& spec, std::size_t byteInData) {
+  const unsigned stride = spec.element.size;
   const std::size_t element = byteInData / stride;
   const auto offset = static_cast<unsigned>(byteInData % stride);
-  for (const Field& f : out.spec->element.fields)
+  for (const Field& f : spec.element.fields)
     if (offset >= f.offset && offset < f.offset + f.scalars * kWord)
-      return fmt::format("{}[{}].{}", out.spec->name, element, f.name);
-  return fmt::format("{}[{}] + {} bytes", out.spec->name, element, offset);
+      return fmt::format("{}[{}].{}", spec.name, element, f.name);
+  return fmt::format("{}[{}] + {} bytes", spec.name, element, offset);
+}
+
+/// An input is nobody's to write, its guard included: the twin would judge what the module left.
+void checkInput(std::vector<std::string>& findings, Gpu& gpu, const Input& in, const char* module) {
+  Bytes now(in.buffer.size());
+  gpu.download(in.buffer, 0, now);
+  const auto changed = std::ranges::mismatch(in.bytes, now).in1;
+  if (changed != in.bytes.end()) {
+    const auto byte = static_cast<std::size_t>(changed - in.bytes.begin());
+    findings.push_back(
+        fmt::format("the {} wrote into its input, at {}", module, where(*in.spec, byte)));
+    return;
+  }
+  for (std::size_t at = (in.bytes.size() + kWord - 1) / kWord; at < now.size() / kWord; ++at)
+    if (wordAt(now, at) != kPoison[0])
+      return findings.push_back(
+          fmt::format("the {} wrote past the end of its input '{}'", module, in.spec->name));
 }
 
 void checkGuards(std::vector<std::string>& findings, const Output& out,
@@ -140,13 +167,13 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
   if (unwritten > 0)
     findings.push_back(fmt::format("the {} left {} of {} words of '{}' unwritten, first {}", module,
                                    unwritten, first.size() / kWord, out.spec->name,
-                                   where(out, firstUnwritten)));
+                                   where(*out.spec, firstUnwritten)));
   if (differing > 0 && deterministic)
     findings.push_back(
         fmt::format("two runs of the {} on the same input differ in {} words of '{}', first {}: it "
                     "reads memory "
                     "that nobody wrote, or its threads race",
-                    module, differing, out.spec->name, where(out, firstDiffering)));
+                    module, differing, out.spec->name, where(*out.spec, firstDiffering)));
 }
 
 Bytes elementsIn(const Output& out, const Bytes& whole) {
@@ -157,10 +184,11 @@ Bytes elementsIn(const Output& out, const Bytes& whole) {
 /// Both runs of one module; returns the elements of the first.
 std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
                                            const GpuProgram& program, const Stimulus& stimulus,
-                                           const char* module, std::vector<std::string>& findings,
-                                           double* ns) {
+                                           const char* module, std::vector<std::string>& findings) {
   std::vector<Bytes> runs[2];
-  for (int i : {0, 1}) runs[i] = runOnce(subject, setup, program, kPoison[i], stimulus.limit, ns);
+  uploadInputs(subject.gpu(), setup);
+  for (int i : {0, 1}) runs[i] = runOnce(subject, setup, program, kPoison[i], stimulus.limit);
+  for (const Input& in : setup.inputs) checkInput(findings, subject.gpu(), in, module);
   std::map<std::string, Bytes> data;
   for (std::size_t o = 0; o < setup.outputs.size(); ++o) {
     const Output& out = setup.outputs[o];
@@ -179,10 +207,8 @@ std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
 Observation observe(const Subject& subject, const Stimulus& stimulus) {
   Observation seen;
   Setup setup = prepare(subject, stimulus);
-  seen.plain = observeModule(subject, setup, subject.plain(), stimulus, "kernel", seen.findings,
-                             &seen.gpuNanoseconds);
-  seen.twin = observeModule(subject, setup, subject.twin(), stimulus, "strict twin", seen.findings,
-                            nullptr);
+  seen.plain = observeModule(subject, setup, subject.plain(), stimulus, "kernel", seen.findings);
+  seen.twin = observeModule(subject, setup, subject.twin(), stimulus, "strict twin", seen.findings);
   for (const std::string& message : subject.gpu().takeMessages())
     seen.findings.push_back("validation layer: " + message);
   return seen;
@@ -190,8 +216,9 @@ Observation observe(const Subject& subject, const Stimulus& stimulus) {
 
 std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus) {
   Setup setup = prepare(subject, stimulus);
+  uploadInputs(subject.gpu(), setup);
   const std::vector<Bytes> whole =
-      runOnce(subject, setup, subject.twin(), kPoison[0], stimulus.limit, nullptr);
+      runOnce(subject, setup, subject.twin(), kPoison[0], stimulus.limit);
   std::map<std::string, Bytes> data;
   for (std::size_t o = 0; o < whole.size(); ++o)
     data[setup.outputs[o].spec->name] = elementsIn(setup.outputs[o], whole[o]);

@@ -36,7 +36,6 @@ struct Observation {
   std::map<std::string, std::vector<std::byte>> plain{};  ///< outputs of the module as it is
   std::map<std::string, std::vector<std::byte>> twin{};   ///< outputs of its strict twin
   std::vector<std::string> findings{};  ///< hygiene: one sentence each; empty if clean
-  double gpuNanoseconds = 0;            ///< fastest run of the plain module
 };
 
 /// Outputs and guard bands are poisoned before every run, with one pattern in the first and another
@@ -45,8 +44,9 @@ struct Observation {
 /// Inputs end in a guard band of NaN, so reading past the end poisons a result. Guard bands lie
 /// inside the bound range: a driver that clips accesses to the range must not hide a stray write.
 ///
-/// Findings: words not written, writes outside, runs that differ though the contract says
-/// deterministic, validation messages. Throws GpuError when the device is lost or the limit passes.
+/// Findings: words not written, writes outside, writes into inputs, runs that differ though the
+/// contract says deterministic, validation messages. Throws GpuError when the device is lost or the
+/// limit passes.
 Observation observe(const Subject& subject, const Stimulus& stimulus);
 
 /// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so

@@ -121,6 +121,10 @@ std::vector<std::string> contradictions(const KernelRecord& record, const Reflec
           fmt::format("the shader binds {} '{}' (set {}, binding {}), which the contract "
                       "does not know",
                       b.kind, b.name, b.set, b.binding));
+  if (reflection.groupSize != record.groupSize)
+    lines.push_back(fmt::format("a group is {} threads in the shader, {} in the contract",
+                                fmt::join(reflection.groupSize, " x "),
+                                fmt::join(record.groupSize, " x ")));
   if (reflection.pushBytes != record.push.size)
     lines.push_back(fmt::format("push constants take {} bytes in the shader, {} in the contract",
                                 reflection.pushBytes, record.push.size));

@@ -91,6 +91,7 @@ struct KernelRecord {
   std::string file{};   ///< under kernels/
   std::vector<BufferSpec> buffers{};
   Struct push;
+  std::array<unsigned, 3> groupSize{1, 1, 1};
   /// Groups for a number of items.
   std::function<std::array<std::uint32_t, 3>(std::size_t items)> grid;
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name

@@ -27,18 +27,27 @@ void add(KernelSummary& sum, const CaseRecord& record) {
     sum.verdict = std::max(sum.verdict, v.verdict);
     sum.widening = std::max(sum.widening, v.widening);
     sum.maxBudget = std::max(sum.maxBudget.value_or(0), v.maxBudget());
+    sum.exact &= std::ranges::all_of(v.fields, [](const auto& f) { return f.specWidth == 0; });
   }
   if (record.failed) sum.verdict = Class::kWrong;
 }
 
+bool judged(const KernelSummary& k) { return k.failed > 0 || k.maxBudget.has_value(); }
+
 std::string className(const KernelSummary& k) {
   if (k.unsupported) return "unsupported";
+  if (!judged(k)) return "not judged";
   if (k.verdict == Class::kEquivalent) return fmt::format("equivalent (k = {})", k.widening);
   return std::string(nameOf(k.verdict));
 }
 
+std::string budgetText(const KernelSummary& k) {
+  if (!k.maxBudget) return "";
+  return k.exact ? "exact" : fmt::format("{:.3g}", *k.maxBudget);
+}
+
 Colour colourOf(const KernelSummary& k) {
-  if (k.unsupported || k.verdict == Class::kEquivalent) return Colour::kYellow;
+  if (k.unsupported || !judged(k) || k.verdict == Class::kEquivalent) return Colour::kYellow;
   return k.verdict == Class::kConforms ? Colour::kGreen : Colour::kRed;
 }
 
@@ -144,8 +153,7 @@ std::string summaryTable(const std::vector<KernelSummary>& kernels, const Termin
                               : k.skipped > 0 ? fmt::format("{} ({} skipped)", k.cases, k.skipped)
                                               : fmt::format("{}", k.cases);
     rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), cases, grouped(k.elements),
-                    k.maxBudget ? fmt::format("{:.3g}", *k.maxBudget) : "exact",
-                    fmt::format("{:.1f} s", k.seconds)});
+                    budgetText(k), fmt::format("{:.1f} s", k.seconds)});
   }
   return table(rows, "llrrrr");
 }
@@ -158,7 +166,9 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
     failed += k.failed;
     stages.push_back({{"stage", k.stage},
                       {"kernel", k.kernel},
-                      {"class", nameOf(k.verdict)},
+                      {"class", k.unsupported ? "unsupported"
+                                : !judged(k)  ? "not judged"
+                                              : nameOf(k.verdict)},
                       {"widening", k.widening},
                       {"cases", k.cases},
                       {"failed", k.failed},
@@ -167,7 +177,7 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                       {"outside", k.outside},
                       {"ambiguous", k.ambiguous},
                       {"reassociated", k.reassociated},
-                      {"maxBudget", finite(k.maxBudget)},
+                      {"maxBudget", k.exact ? nullptr : finite(k.maxBudget)},
                       {"seconds", k.seconds},
                       {"unsupported", k.unsupported ? nlohmann::json(*k.unsupported) : nullptr},
                       {"domains", domainsOf(k)},

@@ -18,7 +18,8 @@ struct KernelSummary {
   int widening = 0;
   std::size_t cases = 0, failed = 0, skipped = 0;
   std::size_t elements = 0, outside = 0, ambiguous = 0, reassociated = 0;
-  std::optional<double> maxBudget{};  ///< none: every output is exact, or nothing was judged
+  std::optional<double> maxBudget{};  ///< none: nothing was judged
+  bool exact = true;                  ///< every output was to be exact
   double seconds = 0;
   std::optional<std::string> unsupported{};
   std::vector<const CaseRecord*> records{};

@@ -19,8 +19,6 @@ const char* code(Colour colour) {
       return "\033[33m";
     case Colour::kRed:
       return "\033[31m";
-    case Colour::kDim:
-      return "\033[2m";
     case Colour::kNone:
       break;
   }

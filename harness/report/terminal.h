@@ -7,7 +7,7 @@
 
 namespace gnomon {
 
-enum class Colour { kNone, kGreen, kYellow, kRed, kDim };
+enum class Colour { kNone, kGreen, kYellow, kRed };
 
 /// Human output to one stream; standard error when standard output carries JSON.
 class Terminal {

@@ -25,6 +25,7 @@ struct Expectation {
   std::size_t elements = 0;
   /// The first `corners` elements are corner cases and are always judged by intervals.
   std::size_t corners = 0;
+  bool judgesRules = false;  ///< what is judged are the rules themselves, however wide they are
   /// The plain double model, which clears most elements cheaply.
   std::function<void(std::size_t element, std::span<double> scalars)> plain;
   /// The interval model, under the rules in force on the calling thread. Called by many threads.
@@ -73,6 +74,7 @@ struct Verdict {
   /// Of them judged by intervals. The rest was cleared by the model; or left alone, where the first
   /// thousands showed that the kernel is wrong at large.
   std::size_t bounded = 0;
+  bool truncated = false;         ///< wrong at large, so the rest was left alone
   std::size_t outside = 0;        ///< elements of the twin outside the specification's bound
   std::size_t outsideDevice = 0;  ///< outside the device's bound
   std::size_t ambiguous = 0;      ///< elements with a joined branch, of the `bounded` ones

@@ -29,6 +29,7 @@ const bool registered = registerKernel({
     .buffers = {{"samples", kSamples, Access::kRead, sample()},
                 {"results", kResults, Access::kWrite, shaded()}},
     .push = describe<Evaluate>("Evaluate", field("count", &Evaluate::count)),
+    .groupSize = {kGroupSize, 1, 1},
     .grid = linearGrid(kGroupSize),
     .features = {"scalarBlockLayout"},
     .deterministic = true,

@@ -10,7 +10,8 @@ GNOMON_CONTRACT(brdf)
 // What is evaluated. Bad input is part of the contract: a component that is NaN or infinite counts
 // as 0, ranges are enforced by clamping, and a vector counts as zero if it is too short to be a
 // unit vector (kShortestUnit). A zero vector makes every output 0; so does a light so nearly
-// opposite to the view that the half vector would be rounding noise (kShortestHalf).
+// opposite to the view that the half vector would be rounding noise (kShortestHalf). Ranges of
+// outputs hold to a few roundings.
 struct Sample {
   vec3 normal;      // n, unit; components clamped to [-1, 1]
   float roughness;  // perceptual r, clamped to [kMinRoughness, 1]

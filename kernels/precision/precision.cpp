@@ -20,6 +20,7 @@ KernelRecord entry(const char* name, uint operation) {
                   {"results", kResults, Access::kWrite,
                    describe<Result>("Result", field("value", &Result::value))}},
       .push = describe<Measure>("Measure", field("count", &Measure::count)),
+      .groupSize = {kGroupSize, 1, 1},
       .grid = linearGrid(kGroupSize),
       .features = {"scalarBlockLayout"},
       .specialization = {{kOperationId, operation}},

@@ -85,6 +85,9 @@ struct Rules {
   // error of its own because it inherits and was not measured.
   Error error(Operation operation, double lo, double hi) const;
 
+  // What the specification allows; nothing for an operation that inherits its precision.
+  static std::optional<Error> specifiedError(Operation operation, double lo, double hi);
+
   // Worst relative error of one + - * whose result is a normal float.
   double unitRoundoff() const noexcept {
     return rounding == Rounding::nearestEven ? 0x1p-24 : 0x1p-23;

@@ -65,7 +65,8 @@ std::vector<Sample> bulk(std::size_t n, std::uint64_t seed) {
 
 std::vector<Sample> lobe(std::size_t n, std::uint64_t seed) {
   return repeat(n, seed, [](Random& random) {
-    const double r = random.uniform(0, 0.2), alpha = std::max(r, double{kMinRoughness}) * r;
+    const double r = random.uniform(0, 0.2), clamped = std::max(r, double{kMinRoughness});
+    const double alpha = clamped * clamped;
     const double u = random.uniform();
     const glm::dvec3 normal = random.direction();
     const glm::dvec3 h = around(normal, std::atan(alpha * std::sqrt(u / (1 - u))),

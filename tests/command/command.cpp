@@ -11,6 +11,8 @@
 namespace gnomon {
 
 Said gnomonSays(const std::string& arguments, const std::string& streams) {
+  static const Scratch cache;
+  setenv("XDG_CACHE_HOME", cache.path().c_str(), 1);
   const std::string line =
       std::string(GNOMON_COMMAND) + " " + arguments + " " + streams + " </dev/null";
   Said said;

@@ -44,6 +44,7 @@ KernelRecord recordOf(bool signOfZero = false) {
       .buffers = {{"values", 0, Access::kRead, describe<Number>("Number", field("x", &Number::x))},
                   {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
       .push = describe<Push>("Push", field("count", &Push::count)),
+      .groupSize = {64, 1, 1},
       .grid = linearGrid(64),
       .features = {"scalarBlockLayout"}};
 }
@@ -57,7 +58,7 @@ SpirvWords kernelWith(const std::string& body) {
 layout(local_size_x = 64) in;
 struct Number { float x; };
 layout(push_constant, scalar) uniform P { uint count; };
-layout(set = 0, binding = 0, scalar) readonly buffer Values { Number values[]; };
+layout(set = 0, binding = 0, scalar) buffer Values { Number values[]; };
 layout(set = 0, binding = 1, scalar) buffer Results { Number results[]; };
 void main() {
   uint i = gl_GlobalInvocationID.x;
@@ -158,6 +159,35 @@ TEST_F(Judge, RefusesAReadPastTheEndOfAnInput) {
       ramp(200), kTimesThree);  // the ramp's step is 0.125
   EXPECT_EQ(v.verdict, Class::kWrong);
   EXPECT_EQ(v.worst->element, 199u);
+}
+
+TEST_F(Judge, RefusesAWriteIntoAnInput) {
+  const Verdict v =
+      judged("if (i < count) { results[i].x = values[i].x * 3.0; if (i == 5u) values[i].x = 7.0; }",
+             ramp(200), kTimesThree);
+  EXPECT_EQ(v.verdict, Class::kWrong);
+  EXPECT_TRUE(mentions(v, "wrote into its input, at values[5].x"));
+}
+
+TEST_F(Judge, RefusesAWritePastTheEndOfAnInput) {
+  const Verdict v =
+      judged("if (i < count) results[i].x = values[i].x * 3.0; if (i == count) values[i].x = 7.0;",
+             ramp(200), kTimesThree);
+  EXPECT_EQ(v.verdict, Class::kWrong);
+  EXPECT_TRUE(mentions(v, "wrote past the end of its input 'values'"));
+}
+
+TEST_F(Judge, RefusesACaseWhoseBoundsAreTooWideToProveAnything) {
+  std::vector<Number> small(200);
+  for (std::size_t i = 0; i < small.size(); ++i) small[i].x = 1e-3f * static_cast<float>(i + 1);
+  const Verdict v = judged(
+      "if (i < count) results[i].x = 1.0 / inversesqrt((values[i].x + 1024.0) * (values[i].x + "
+      "1024.0)) - 1024.0;",
+      small, []<class T>(const T& x) {
+        return T(1) / inversesqrt((x + T(1024)) * (x + T(1024))) - T(1024);
+      });
+  EXPECT_EQ(v.verdict, Class::kWrong);
+  EXPECT_TRUE(mentions(v, "proves nothing"));
 }
 
 TEST_F(Judge, RefusesAnElementLeftUnwritten) {
@@ -289,6 +319,15 @@ TEST(Budget, OfAnExactResultIsNothingOrInfinite) {
   const Bounded one(1.0f);
   EXPECT_EQ(budgetUsed(1, one, false), 0);
   EXPECT_EQ(budgetUsed(1 + 0x1p-23, one, false), std::numeric_limits<double>::infinity());
+}
+
+TEST(Budget, AtInfinityAsksOnlyWhetherTheResultIsInside) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  Bounded b = Bounded::between(0x1.fffffep127, infinity);
+  b.value = infinity;
+  EXPECT_EQ(budgetUsed(infinity, b, false), 0);
+  EXPECT_EQ(budgetUsed(0x1.fffffep127, b, false), 0);
+  EXPECT_EQ(budgetUsed(1, b, false), infinity);
 }
 
 TEST(Budget, OfNanIsInfiniteUnlessNanIsAllowed) {

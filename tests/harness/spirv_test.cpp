@@ -232,7 +232,7 @@ TEST(StrictTwin, ItStopsTheDeviceFromContracting) {
   const auto evaluate = [&](SpirvWords words) {
     ProgramDescription description;
     description.spirv = std::move(words);
-    description.slots = {{0, 0, false}};
+    description.slots = {BindingSlot{0, 0}};
     description.pushBytes = 8;
     const GpuProgram program = gpu.build(description);
     const GpuBuffer to = gpu.allocate(4);
