@@ -19,7 +19,6 @@ namespace {
 using Id = std::uint32_t;
 using BuiltIn = std::uint32_t;
 
-constexpr std::size_t kHeaderWords = 5;
 constexpr std::size_t kBoundWord = 3;
 constexpr Id kMaxBound = 0x3fffff;  // SPIR-V 2.17, "Universal Limits"
 
@@ -60,12 +59,6 @@ const typename Map::mapped_type& declared(const Map& map, Id id) {
   if (found == map.end())
     throw UsageError(fmt::format("malformed SPIR-V: id {} is not declared as its use needs", id));
   return found->second;
-}
-
-void append(SpirvWords& words, spv::Op opcode, const SpirvWords& operands) {
-  const auto length = static_cast<std::uint32_t>(operands.size() + 1);
-  words.push_back(length << spv::WordCountShift | static_cast<std::uint32_t>(opcode));
-  words.insert(words.end(), operands.begin(), operands.end());
 }
 
 // ---- what the module says ------------------------------------------------------------------
@@ -241,13 +234,13 @@ class OrderTwin {
   Id global(spv::Op opcode, Id typeId, SpirvWords operands) {
     if (typeId != 0) operands.insert(operands.begin(), typeId);
     SpirvWords key;
-    append(key, opcode, operands);
+    appendInstruction(key, opcode, operands);
     key[0] += 1u << spv::WordCountShift;  // the result counts in the length
     const auto [found, isNew] = survey.globals.emplace(key, 0);
     if (isNew) {
       found->second = fresh();
       operands.insert(operands.begin() + (typeId != 0), found->second);
-      append(declarations, opcode, operands);
+      appendInstruction(declarations, opcode, operands);
       if (opcode == spv::OpTypePointer) survey.pointees[found->second] = operands[2];
     }
     return found->second;
@@ -265,7 +258,8 @@ class OrderTwin {
   Id variable(Id pointee, spv::StorageClass storage) {
     const Id pointer = pointerTo(pointee, storage);
     const Id id = fresh();
-    append(declarations, spv::OpVariable, {pointer, id, static_cast<std::uint32_t>(storage)});
+    appendInstruction(declarations, spv::OpVariable,
+                      {pointer, id, static_cast<std::uint32_t>(storage)});
     survey.types[id] = pointer;
     return id;
   }
@@ -286,7 +280,7 @@ class OrderTwin {
   Id add(spv::Op opcode, Id typeId, SpirvWords operands) {
     const Id id = fresh();
     operands.insert(operands.begin(), {typeId, id});
-    append(prologue->code, opcode, operands);
+    appendInstruction(prologue->code, opcode, operands);
     return id;
   }
 
@@ -314,7 +308,8 @@ class OrderTwin {
     const auto [found, isNew] = survey.inputs.emplace(builtIn, 0);
     if (isNew) {
       found->second = variable(typeId, spv::StorageClassInput);
-      append(decorations, spv::OpDecorate, {found->second, spv::DecorationBuiltIn, builtIn});
+      appendInstruction(decorations, spv::OpDecorate,
+                        {found->second, spv::DecorationBuiltIn, builtIn});
     }
     return found->second;
   }
@@ -428,7 +423,7 @@ class OrderTwin {
 
   void store(Id input, Id value, Id typeId) {
     const Id to = privateOf(input);
-    append(prologue->code, spv::OpStore, {to, cast(value, typeId, pointeeOf(input))});
+    appendInstruction(prologue->code, spv::OpStore, {to, cast(value, typeId, pointeeOf(input))});
     prologue->privates.push_back(to);
   }
 
@@ -446,7 +441,7 @@ class OrderTwin {
     SpirvWords operands(words.begin() + 1, words.end());
     operands.insert(operands.end(), wanted.begin(), wanted.end());
     SpirvWords instruction;
-    append(instruction, spv::OpEntryPoint, operands);
+    appendInstruction(instruction, spv::OpEntryPoint, operands);
     return instruction;
   }
 
@@ -489,7 +484,7 @@ class OrderTwin {
 
   SpirvWords rewrite() {
     const SpirvWords code = functions();  // first, for it may declare types
-    SpirvWords words(module.words.begin(), module.words.begin() + kHeaderWords);
+    SpirvWords words(module.words.begin(), module.words.begin() + kSpirvHeaderWords);
     for (std::size_t i = 0; i < survey.firstFunction; ++i) {
       const std::span old = module.wordsOf(module.instructions[i]);
       const bool isEntryPoint = module.instructions[i].opcode == spv::OpEntryPoint;

@@ -21,8 +21,6 @@
 namespace gnomon {
 namespace {
 
-constexpr std::size_t kHeaderWords = 5;
-
 std::uint32_t swapBytes(std::uint32_t word) {
   return word >> 24 | (word >> 8 & 0xff00u) | (word << 8 & 0xff0000u) | word << 24;
 }
@@ -62,6 +60,12 @@ SpirvWords readSpirv(const std::filesystem::path& file) {
     throw UsageError(fmt::format("{}: no SPIR-V: it does not begin with the magic number 07230203",
                                  file.string()));
   return words;
+}
+
+void appendInstruction(SpirvWords& words, std::uint32_t opcode, const SpirvWords& operands) {
+  const auto length = static_cast<std::uint32_t>(operands.size() + 1);
+  words.push_back(length << spv::WordCountShift | opcode);
+  words.insert(words.end(), operands.begin(), operands.end());
 }
 
 std::string validateSpirv(std::span<const std::uint32_t> module) {
@@ -270,12 +274,6 @@ Survey surveyOf(const SpirvModule& module) {
   return survey;
 }
 
-void append(SpirvWords& words, spv::Op opcode, const SpirvWords& operands) {
-  const auto length = static_cast<std::uint32_t>(operands.size() + 1);
-  words.push_back(length << spv::WordCountShift | static_cast<std::uint32_t>(opcode));
-  words.insert(words.end(), operands.begin(), operands.end());
-}
-
 SpirvWords noContractions(const SpirvModule& module, const Survey& survey) {
   SpirvWords words;
   for (const SpirvInstruction& instruction : module.instructions) {
@@ -283,7 +281,8 @@ SpirvWords noContractions(const SpirvModule& module, const Survey& survey) {
                         survey.floatTypes.contains(instruction.typeId) &&
                         !survey.noContraction.contains(instruction.resultId);
     if (wanted)
-      append(words, spv::OpDecorate, {instruction.resultId, spv::DecorationNoContraction});
+      appendInstruction(words, spv::OpDecorate,
+                        {instruction.resultId, spv::DecorationNoContraction});
   }
   return words;
 }
@@ -300,10 +299,11 @@ struct FloatControls {
           mode == spv::ExecutionModeRoundingModeRTE &&
           survey.modes32.contains({function, spv::ExecutionModeRoundingModeRTZ});
       if (!contradicted && !survey.modes32.contains({function, mode}))
-        append(modes, spv::OpExecutionMode, {function, static_cast<std::uint32_t>(mode), 32});
+        appendInstruction(modes, spv::OpExecutionMode,
+                          {function, static_cast<std::uint32_t>(mode), 32});
     }
     if (modes.size() > before && !survey.capabilities.contains(capability))
-      append(declarations, spv::OpCapability, {static_cast<std::uint32_t>(capability)});
+      appendInstruction(declarations, spv::OpCapability, {static_cast<std::uint32_t>(capability)});
   }
 };
 
@@ -317,7 +317,7 @@ FloatControls floatControls(const SpirvModule& module, const Survey& survey,
     controls.add(survey, spv::ExecutionModeRoundingModeRTE, spv::CapabilityRoundingModeRTE);
   const bool inCore = module.words[1] >= 0x00010400;  // SPIR-V 1.4
   if (!controls.modes.empty() && !inCore && !survey.floatControlsExtension)
-    append(controls.declarations, spv::OpExtension, stringWords(kFloatControls));
+    appendInstruction(controls.declarations, spv::OpExtension, stringWords(kFloatControls));
   return controls;
 }
 
@@ -336,7 +336,7 @@ SpirvWords strictTwin(std::span<const std::uint32_t> module, const StrictOptions
   insert(survey.afterEntryPoints, controls.modes);
   insert(survey.beforeTypes, noContractions(parsed, survey));
 
-  SpirvWords twin(parsed.words.begin(), parsed.words.begin() + kHeaderWords);
+  SpirvWords twin(parsed.words.begin(), parsed.words.begin() + kSpirvHeaderWords);
   for (std::size_t i = 0; i <= parsed.instructions.size(); ++i) {
     if (const auto found = insertions.find(i); found != insertions.end())
       twin.insert(twin.end(), found->second.begin(), found->second.end());

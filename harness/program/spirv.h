@@ -45,6 +45,12 @@ struct SpirvModule {
 /// bound), not against the rules of validity. Throws UsageError with the first violation.
 SpirvModule parseSpirv(std::span<const std::uint32_t> module);
 
+/// Words before the first instruction of any module.
+inline constexpr std::size_t kSpirvHeaderWords = 5;
+
+/// Adds one instruction: `opcode` is an spv::Op.
+void appendInstruction(SpirvWords& words, std::uint32_t opcode, const SpirvWords& operands);
+
 /// What the strict twin may declare on this device.
 struct StrictOptions {
   bool signedZeroInfNanPreserve = false;

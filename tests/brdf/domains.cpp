@@ -96,29 +96,29 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 
 std::vector<Sample> degenerate() {
   using Limits = std::numeric_limits<float>;
-  constexpr std::array kSpecial = {0.0f,
-                                   -0.0f,
-                                   1.0f,
-                                   -1.0f,
-                                   0.5f,
-                                   2.0f,
-                                   -2.0f,
-                                   Limits::min(),
-                                   -Limits::min(),
-                                   Limits::denorm_min(),
-                                   Limits::max(),
-                                   Limits::lowest(),
-                                   Limits::infinity(),
-                                   -Limits::infinity(),
-                                   Limits::quiet_NaN(),
-                                   -Limits::quiet_NaN(),
-                                   kMinRoughness,
-                                   kShortestHalf,
-                                   kMinNoV,
-                                   1e-10f,
-                                   1e10f,
-                                   1e-30f,
-                                   1e30f};
+  const std::array special = {0.0f,
+                              -0.0f,
+                              1.0f,
+                              -1.0f,
+                              0.5f,
+                              2.0f,
+                              -2.0f,
+                              Limits::min(),
+                              -Limits::min(),
+                              Limits::denorm_min(),
+                              Limits::max(),
+                              Limits::lowest(),
+                              Limits::infinity(),
+                              -Limits::infinity(),
+                              Limits::quiet_NaN(),
+                              -Limits::quiet_NaN(),
+                              kMinRoughness,
+                              kShortestHalf,
+                              kMinNoV,
+                              1e-10f,
+                              1e10f,
+                              1e-30f,
+                              1e30f};
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
                         .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),
@@ -128,17 +128,17 @@ std::vector<Sample> degenerate() {
                         .irradiance = {3.0f, 2.0f, 1.0f}};
   std::vector<Sample> all = {ordinary};
   for (std::size_t i = 0; i < kScalars; ++i)
-    for (const float a : kSpecial) {
+    for (const float a : special) {
       Sample one = ordinary;
       scalar(one, i) = a;
       all.push_back(one);
-      for (const float b : kSpecial) {
+      for (const float b : special) {
         Sample two = one;
         scalar(two, (i + 1) % kScalars) = b;
         all.push_back(two);
       }
     }
-  for (const float a : kSpecial)
+  for (const float a : special)
     for (vec3 Sample::*vector :
          {&Sample::normal, &Sample::view, &Sample::light, &Sample::albedo, &Sample::irradiance}) {
       Sample whole = ordinary;

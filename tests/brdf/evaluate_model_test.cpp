@@ -124,7 +124,7 @@ TEST(BrdfEvaluateModel, TheWeakFurnaceHoldsForSmithAndNotForSchlick) {
 
 TEST(BrdfEvaluateModel, FresnelIsF0HeadOnAndOneAtGrazing) {
   const Vec3<double> F0{0.04, 0.5, 1};
-  for (int c = 0; c < 3; ++c) {
+  for (std::size_t c = 0; c < 3; ++c) {
     EXPECT_EQ(F_Schlick(1.0, F0)[c], F0[c]);
     EXPECT_EQ(F_Schlick(0.0, F0)[c], 1.0);
     EXPECT_EQ(F_SchlickRoughness(1.0, F0, 0.3)[c], F0[c]);

@@ -109,7 +109,8 @@ TEST_F(BrdfEvaluate, SwappingViewAndLightChangesNothing) {
   for (std::size_t i = 0; i < there.size(); ++i) {
     const auto allowed = explore([&] { return evaluate<Bounded>(forward[i]); });
     for (int c = 0; c < 3; ++c) {
-      const Bounded sum = allowed.specular[c] + allowed.diffuse[c];
+      const auto component = static_cast<std::size_t>(c);
+      const Bounded sum = allowed.specular[component] + allowed.diffuse[component];
       const double a = double{there[i].specular[c]} + there[i].diffuse[c];
       const double b = double{back[i].specular[c]} + back[i].diffuse[c];
       // Each side has the whole interval to itself: both may err by its width, apart.

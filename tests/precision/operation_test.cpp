@@ -47,8 +47,8 @@ struct Subject {
 
 using B = const Bounded&;
 constexpr float kMin = std::numeric_limits<float>::min(), kMax = std::numeric_limits<float>::max();
-// The last float below pi, pi/2: the domains of sin, cos and tan end there.
-constexpr double kPi = 3.1415925f, kHalfPi = 1.5707963f;
+// The last float below pi: the domains of sin and cos end there.
+constexpr double kPi = 3.1415925f;
 constexpr Interval kAny{-kMax, kMax}, kNone{0, 0};
 
 // clang-format off
