@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,14 @@ struct BenchOptions {
   std::string json;
 };
 int bench(const BenchOptions& options);
+
+struct CompareOptions {
+  std::filesystem::path reference, test;  ///< OpenEXR files
+  std::filesystem::path heatmap;          ///< PNG, where not empty
+  std::optional<double> max, flip;        ///< limits of the largest error and of FLIP's mean
+  std::string json;
+};
+int compare(const CompareOptions& options);
 
 /// Runs ctest in the folder that the command was built in.
 int test(const std::vector<std::string>& arguments);

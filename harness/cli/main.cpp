@@ -128,6 +128,24 @@ void addBench(CLI::App& app, Action& action) {
   command->callback([&action, o] { action = [o] { return bench(*o); }; });
 }
 
+void addCompare(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "compare", "Two OpenEXR images: largest error, RMSE, worst block, PSNR, FLIP");
+  auto o = std::make_shared<CompareOptions>();
+  command->add_option("A", o->reference, "The reference")->required()->type_name("A.exr");
+  command->add_option("B", o->test, "What is judged")->required()->type_name("B.exr");
+  command->add_option("--heatmap", o->heatmap, "Write FLIP's error map as PNG")->type_name("FILE");
+  command->add_option("--max", o->max, "Exit 1 where the largest error is above X")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("X");
+  command->add_option("--flip", o->flip, "Exit 1 where FLIP's mean is above X")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("X");
+  command->add_option("--json", o->json, "Write as JSON to FILE, or -")->type_name("FILE");
+  command->footer(kExit);
+  command->callback([&action, o] { action = [o] { return compare(*o); }; });
+}
+
 void addTest(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("test", "Every test of the project, through ctest");
   auto arguments = std::make_shared<std::vector<std::string>>();
@@ -150,6 +168,7 @@ int run(int argc, char** argv) {
   addList(app, action);
   addValidate(app, action);
   addBench(app, action);
+  addCompare(app, action);
   addTest(app, action);
   try {
     app.parse(argc, argv);

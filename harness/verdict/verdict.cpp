@@ -186,7 +186,11 @@ class Judge {
       Intervals allowed(scalars.size());
       for (std::size_t k = begin; k < end; ++k) {
         evaluate(deciding(), elements[k], allowed.device);
-        if (!measureWidths && admitsBoth(elements[k], allowed.device)) continue;
+        if (!measureWidths && admitsBoth(elements[k], allowed.device)) {
+          const std::lock_guard lock(mutex);
+          noteBudgets(elements[k], allowed.device);
+          continue;
+        }
         evaluate(bounds.spec, elements[k], allowed.spec);
         evaluate(bounds.plain, elements[k], allowed.plain);
         const std::lock_guard lock(mutex);
@@ -200,10 +204,17 @@ class Judge {
   bool admitsBoth(std::size_t i, const std::vector<Bounded>& allowed) const {
     for (std::size_t s = 0; s < scalars.size(); ++s)
       if ((allowed[s].flags & (kAmbiguous | kUnspecified | kNotJudged)) != 0 ||
-          budgetUsed(twin(i, scalars[s]), allowed[s], scalars[s].signOfZero) > 0.5 ||
-          budgetUsed(plain(i, scalars[s]), allowed[s], false) > 0.5)
+          budgetUsed(twin(i, scalars[s]), allowed[s], scalars[s].signOfZero) > 1 ||
+          budgetUsed(plain(i, scalars[s]), allowed[s], false) > 1)
         return false;
     return true;
+  }
+
+  void noteBudgets(std::size_t i, const std::vector<Bounded>& allowed) {
+    for (std::size_t s = 0; s < scalars.size(); ++s) {
+      double& worst = result.fields[scalars[s].field].budget;
+      worst = std::max(worst, budgetUsed(twin(i, scalars[s]), allowed[s], scalars[s].signOfZero));
+    }
   }
 
   void evaluate(const Rules& rules, std::size_t i, std::vector<Bounded>& out) const {

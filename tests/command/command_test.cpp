@@ -54,6 +54,13 @@ TEST(Command, RefusesForeignKernelsThatAreNone) {
   expectUsageError(judge("other.comp"), "no buffer 'samples'");
 }
 
+TEST(Command, CompareRefusesFilesThatAreNoImages) {
+  const Scratch scratch;
+  const std::string junk = scratch.file("junk.exr", "junk").string();
+  expectUsageError("compare " + junk + " " + junk, "junk.exr");
+  expectUsageError("compare none.exr none.exr", "none.exr");
+}
+
 TEST(Command, SaysThatThereIsNoSuchDevice) {
   const Said said = gnomonSays("validate brdf --device no-such-device");
   EXPECT_EQ(said.status, 3) << said.output;
