@@ -13,7 +13,7 @@ void evaluateBulk(benchmark::State& state) {
              {.inputs = {{"samples", std::as_bytes(std::span(samples))}},
               .outputs = {{"results", n}},
               .push = std::as_bytes(std::span(&push, 1)),
-              .items = n});
+              .extent = {n}});
 }
 
 BENCHMARK(evaluateBulk)

@@ -5,13 +5,14 @@
 
 #include <benchmark/benchmark.h>
 
-#include "harness/hygiene/observe.h"
+#include "harness/hygiene/stimulus.h"
 
 namespace gnomon {
 
 /// Uploads the stimulus once, runs the kernel as it is (not its twin) for every iteration, and sets
-/// time, items and bytes a second and the device as label. Bytes are those of all buffers of the
-/// contract, each once: the least that has to move. An unsupported kernel skips with the reason.
-void timeKernel(benchmark::State& state, const std::string& kernel, const Stimulus& stimulus);
+/// time, items and bytes a second and the device as label. Bytes are those of all buffers and
+/// images of the contract, each once: the least that has to move. An unsupported kernel skips with
+/// the reason.
+void timeKernel(benchmark::State& state, const std::string& kernel, const Stimulus& given);
 
 }  // namespace gnomon

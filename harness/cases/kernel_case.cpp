@@ -36,16 +36,29 @@ void KernelCase::expectWithinSpecification(const Observation& seen, const Expect
 
 void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
                               const Expectation& expected) {
+  const KernelRecord& contract = Session::current().subject(kernelName).record();
+  const Struct layout = contract.layoutOf(expected.output);
+  record(bounds, seen, expected, layout);
+  if (expected.width == 0) return;
+  const ImageSpec& image = contract.image(expected.output);
+  if (!isNarrow(image.format)) return;
+  Expectation narrow = expected;
+  narrow.output = narrowName(image);
+  narrow.storage = storageOf(image.format);
+  record(bounds, seen, narrow, layout);
+}
+
+void KernelCase::record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
+                        const Struct& layout) {
   Session& session = Session::current();
-  const Subject& subject = session.subject(kernelName);
-  const Struct& layout = subject.record().buffer(expected.buffer).element;
   Verdict verdict = judge(layout, seen, expected, bounds, session.policy(), caseSeed());
   checked(verdict.elements);
   // Another arrangement of a user's is as good as ours; ours has to be the model's own.
   const bool foreign = session.options().kernels.contains(kernelName);
   if (!verdict.ok() ||
       (!foreign && (verdict.outsideDevice > 0 || verdict.verdict != Class::kConforms)))
-    ADD_FAILURE() << subject.origin() << " is " << nameOf(verdict.verdict) << "\n"
+    ADD_FAILURE() << session.subject(kernelName).origin() << " is " << nameOf(verdict.verdict)
+                  << "\n"
                   << explain(verdict, expected);
   session.currentCase().verdicts.push_back(std::move(verdict));
 }
@@ -62,6 +75,14 @@ std::uint64_t caseSeed() {
 std::size_t generated(const char* policyName) {
   const Session& session = Session::current();
   return session.options().cases.value_or(static_cast<std::size_t>(session.policy()[policyName]));
+}
+
+InputImage floatImage(std::string image, const Picture& picture) {
+  return {.image = std::move(image),
+          .description = {.format = PixelFormat::kRgba32f,
+                          .width = picture.size.x,
+                          .height = picture.size.y},
+          .texels = std::as_bytes(std::span(picture.texels))};
 }
 
 }  // namespace gnomon

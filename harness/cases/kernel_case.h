@@ -32,8 +32,9 @@ class KernelCase : public testing::Test {
   /// For laws, which judge without a verdict: fails the case with what hygiene found.
   void expectClean(const Observation& seen);
 
-  /// Judges one output and records the verdict. A kernel of the project must conform; a verdict of
-  /// wrong, or outside the device's measured errors, fails the case with an explanation.
+  /// Judges one output and records the verdict; an image that a frame stores narrowly, also as it
+  /// is read back from its format. A kernel of the project must conform; a verdict of wrong, or
+  /// outside the device's measured errors, fails the case with an explanation.
   void expectConforms(const Observation& seen, const Expectation& expected);
 
   /// The same under the specification alone, for the stage that measures the device.
@@ -46,6 +47,8 @@ class KernelCase : public testing::Test {
 
  private:
   void expectWithin(const Bounds& bounds, const Observation& seen, const Expectation& expected);
+  void record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
+              const Struct& layout);
 };
 
 /// A seed of its own for every case, from the run's seed and the case's name.
@@ -62,6 +65,19 @@ std::vector<T> elementsOf(const std::vector<std::byte>& bytes) {
   return all;
 }
 
+/// A picture on the host: rows from the top, x fastest, components as the kernel sees them.
+struct Picture {
+  uvec2 size{1, 1};
+  std::vector<vec4> texels{};
+
+  const vec4& at(std::size_t pixel) const { return texels[pixel]; }
+  std::size_t pixels() const { return texels.size(); }
+};
+
+/// An input image of 32-bit floats, so that a kernel sees the picture's own numbers. The picture
+/// must outlive it.
+InputImage floatImage(std::string image, const Picture& picture);
+
 /// Calls f for every number of a model's result, in the order of its scalars().
 template <class T, class F>
 void forEachScalar(T& x, F& f) {
@@ -74,9 +90,9 @@ void forEachScalar(T& x, F& f) {
 /// An expectation from a model that is one function template over the number type:
 /// `model.template operator()<T>(i)` returns a struct whose scalars are those of the contract.
 template <class Model, class Describe>
-Expectation expectationOf(std::string buffer, std::size_t elements, Model model, Describe inputs) {
+Expectation expectationOf(std::string output, std::size_t elements, Model model, Describe inputs) {
   Expectation e;
-  e.buffer = std::move(buffer);
+  e.output = std::move(output);
   e.elements = elements;
   e.plain = [model](std::size_t i, std::span<double> out) {
     auto store = [at = out.begin()](double x) mutable { *at++ = x; };
@@ -89,6 +105,14 @@ Expectation expectationOf(std::string buffer, std::size_t elements, Model model,
     forEachScalar(result, store);
   };
   e.inputs = inputs;
+  return e;
+}
+
+/// The same for an image, pixel by pixel: the model returns what the record's format has channels.
+template <class Model, class Describe>
+Expectation pixelsOf(std::string image, const uvec2& size, Model model, Describe inputs) {
+  Expectation e = expectationOf(std::move(image), std::size_t{size.x} * size.y, model, inputs);
+  e.width = size.x;
   return e;
 }
 

@@ -12,9 +12,6 @@ namespace {
 // that NaN would decide goes the other way.
 constexpr std::uint32_t kPoison[2] = {0xffffdeadu, 0x4b1d4b1du};
 
-// Wide enough for a whole group of 1,024 threads to overrun by one 64-byte element each.
-constexpr std::size_t kGuardBytes = 64 * 1024;
-
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 
 std::uint32_t wordAt(std::span<const std::byte> bytes, std::size_t index) {
@@ -23,109 +20,30 @@ std::uint32_t wordAt(std::span<const std::byte> bytes, std::size_t index) {
   return word;
 }
 
-/// One output buffer: guard, elements, guard.
-struct Output {
-  const BufferSpec* spec;
-  std::size_t elements;
-  std::size_t before;  // bytes of the leading guard, aligned for binding
-  GpuBuffer buffer;
-
-  std::size_t dataBytes() const { return elements * spec->element.size; }
-};
-
-/// One input buffer: elements, guard.
-struct Input {
-  const BufferSpec* spec;
-  std::span<const std::byte> bytes;
-  GpuBuffer buffer;
-};
-
-/// The stimulus as device buffers.
-struct Setup {
-  std::vector<Input> inputs;
-  std::vector<Output> outputs;
-  Dispatch dispatch;
-};
-
-void addInput(Setup& setup, Gpu& gpu, const BufferSpec& spec, std::span<const std::byte> bytes) {
-  setup.inputs.push_back({&spec, bytes, gpu.allocate(bytes.size() + kGuardBytes)});
-  setup.dispatch.buffers.push_back(
-      {.slot = {.set = 0, .binding = spec.binding}, .range = bytes.size() + kGuardBytes});
-}
-
-void addOutput(Setup& setup, Gpu& gpu, const BufferSpec& spec, std::size_t elements) {
-  const std::size_t align = std::max<std::size_t>(gpu.offsetAlignment(), kWord);
-  Output out{&spec, elements, (kGuardBytes + align - 1) / align * align, {}};
-  out.buffer = gpu.allocate(out.before + out.dataBytes() + kGuardBytes);
-  setup.dispatch.buffers.push_back({.slot = {.set = 0, .binding = spec.binding},
-                                    .offset = out.before,
-                                    .range = out.dataBytes() + kGuardBytes});
-  setup.outputs.push_back(std::move(out));
-}
-
-// Buffers move while the lists grow, so the dispatch learns their addresses last.
-void bindAddresses(Setup& setup) {
-  std::size_t slot = 0;
-  for (const Input& in : setup.inputs) setup.dispatch.buffers[slot++].buffer = &in.buffer;
-  for (const Output& o : setup.outputs) setup.dispatch.buffers[slot++].buffer = &o.buffer;
-}
-
-Setup prepare(const Subject& subject, const Stimulus& stimulus) {
-  Setup setup;
-  const KernelRecord& record = subject.record();
-  for (const InputBytes& in : stimulus.inputs)
-    addInput(setup, subject.gpu(), record.buffer(in.buffer), in.bytes);
-  for (const OutputCount& out : stimulus.outputs)
-    addOutput(setup, subject.gpu(), record.buffer(out.buffer), out.elements);
-  bindAddresses(setup);
-  setup.dispatch.push.assign(stimulus.push.begin(), stimulus.push.end());
-  setup.dispatch.groups = record.grid(stimulus.items);
-  return setup;
-}
-
-using Bytes = std::vector<std::byte>;
-
-void uploadInputs(Gpu& gpu, const Setup& setup) {
-  for (const Input& in : setup.inputs) {
-    gpu.fill(in.buffer, kPoison[0]);
-    gpu.upload(in.buffer, 0, in.bytes);
-  }
-}
-
-/// One run: whole buffers, guards included, in the order of setup.outputs.
-std::vector<Bytes> runOnce(const Subject& subject, Setup& setup, const GpuProgram& program,
-                           std::uint32_t poison, std::chrono::milliseconds limit) {
-  Gpu& gpu = subject.gpu();
-  for (const Output& o : setup.outputs) gpu.fill(o.buffer, poison);
-  setup.dispatch.program = &program;
-  gpu.run({&setup.dispatch, 1}, limit);
-  std::vector<Bytes> all;
-  for (const Output& o : setup.outputs) {
-    all.emplace_back(o.buffer.size());
-    gpu.download(o.buffer, 0, all.back());
-  }
-  return all;
-}
-
-std::string where(const BufferSpec& spec, std::size_t byteInData) {
-  const unsigned stride = spec.element.size;
-  const std::size_t element = byteInData / stride;
-  const auto offset = static_cast<unsigned>(byteInData % stride);
-  for (const Field& f : spec.element.fields)
+std::string where(const std::string& place, const Struct& layout, std::size_t byte) {
+  const auto offset = static_cast<unsigned>(byte % layout.size);
+  for (const Field& f : layout.fields)
     if (offset >= f.offset && offset < f.offset + f.scalars * kWord)
-      return fmt::format("{}[{}].{}", spec.name, element, f.name);
-  return fmt::format("{}[{}] + {} bytes", spec.name, element, offset);
+      return fmt::format("{}.{}", place, f.name);
+  return fmt::format("{} + {} bytes", place, offset);
+}
+
+std::string where(const Input& in, std::size_t byte) {
+  const Struct& layout = in.spec->element;
+  return where(fmt::format("{}[{}]", in.spec->name, byte / layout.size), layout, byte);
+}
+
+std::string where(const Output& out, std::size_t byte) {
+  return where(out.place(byte / out.layout.size), out.layout, byte);
 }
 
 /// An input is nobody's to write, its guard included: the twin would judge what the module left.
-void checkInput(std::vector<std::string>& findings, Gpu& gpu, const Input& in, const char* module) {
-  Bytes now(in.buffer.size());
-  gpu.download(in.buffer, 0, now);
+void checkInput(std::vector<std::string>& findings, const Input& in, const Bytes& now,
+                const std::string& module) {
   const auto changed = std::ranges::mismatch(in.bytes, now).in1;
   if (changed != in.bytes.end()) {
     const auto byte = static_cast<std::size_t>(changed - in.bytes.begin());
-    findings.push_back(
-        fmt::format("the {} wrote into its input, at {}", module, where(*in.spec, byte)));
+    findings.push_back(fmt::format("the {} wrote into its input, at {}", module, where(in, byte)));
     return;
   }
   for (std::size_t at = (in.bytes.size() + kWord - 1) / kWord; at < now.size() / kWord; ++at)
@@ -135,94 +53,148 @@ void checkInput(std::vector<std::string>& findings, Gpu& gpu, const Input& in, c
 }
 
 void checkGuards(std::vector<std::string>& findings, const Output& out,
-                 std::span<const std::byte> bytes, std::uint32_t poison, const char* module) {
+                 std::span<const std::byte> bytes, std::uint32_t poison,
+                 const std::string& module) {
   const std::size_t end = out.before + out.dataBytes();
-  for (std::size_t at = 0; at + kWord <= bytes.size(); at += kWord) {
-    if (at == out.before) at = end;
-    if (wordAt(bytes.subspan(at), 0) == poison) continue;
-    const auto distance = static_cast<std::ptrdiff_t>(at) - static_cast<std::ptrdiff_t>(end);
-    findings.push_back(
-        distance >= 0
-            ? fmt::format("the {} wrote past the end of '{}': byte {} after its {} elements",
-                          module, out.spec->name, distance, out.elements)
-            : fmt::format("the {} wrote before the start of '{}': byte {} ahead of it", module,
-                          out.spec->name, out.before - at));
-    return;
-  }
+  for (std::size_t at = 0; at < out.before; at += kWord)
+    if (wordAt(bytes, at / kWord) != poison)
+      return findings.push_back(
+          fmt::format("the {} wrote before the start of '{}': byte {} ahead of it", module,
+                      out.name, out.before - at));
+  for (std::size_t at = end; at + kWord <= bytes.size(); at += kWord)
+    if (wordAt(bytes, at / kWord) != poison)
+      return findings.push_back(
+          fmt::format("the {} wrote past the end of '{}': byte {} after its {} elements", module,
+                      out.name, at - end, out.elements));
 }
+
+/// Words that differ, how many and the first; two results have the same length.
+struct Difference {
+  std::size_t words = 0, first = 0;
+
+  void note(std::size_t word) {
+    if (words++ == 0) first = word;
+  }
+};
 
 /// Words that keep their poison in both runs, and words that differ for another reason.
 void checkWords(std::vector<std::string>& findings, const Output& out,
                 std::span<const std::byte> first, std::span<const std::byte> second,
-                bool deterministic, const char* module) {
-  std::size_t unwritten = 0, differing = 0, firstUnwritten = 0, firstDiffering = 0;
+                bool deterministic, const std::string& module) {
   if (std::memcmp(first.data(), second.data(), first.size()) == 0) return;
+  Difference unwritten, differing;
+  const std::size_t perElement = out.layout.size / kWord;
   for (std::size_t i = 0; i < first.size() / kWord; ++i) {
     const std::uint32_t a = wordAt(first, i), b = wordAt(second, i);
     if (a == b) continue;
-    const bool poisoned = a == kPoison[0] && b == kPoison[1];
-    std::size_t& count = poisoned ? unwritten : differing;
-    if (count++ == 0) (poisoned ? firstUnwritten : firstDiffering) = i * kWord;
+    const bool poisoned = a == out.poisoned(kPoison[0], i % perElement) &&
+                          b == out.poisoned(kPoison[1], i % perElement);
+    (poisoned ? unwritten : differing).note(i);
   }
-  if (unwritten > 0)
+  if (unwritten.words > 0)
     findings.push_back(fmt::format("the {} left {} of {} words of '{}' unwritten, first {}", module,
-                                   unwritten, first.size() / kWord, out.spec->name,
-                                   where(*out.spec, firstUnwritten)));
-  if (differing > 0 && deterministic)
-    findings.push_back(
-        fmt::format("two runs of the {} on the same input differ in {} words of '{}', first {}: it "
-                    "reads memory "
-                    "that nobody wrote, or its threads race",
-                    module, differing, out.spec->name, where(*out.spec, firstDiffering)));
+                                   unwritten.words, first.size() / kWord, out.name,
+                                   where(out, unwritten.first * kWord)));
+  if (differing.words > 0 && deterministic)
+    findings.push_back(fmt::format(
+        "two runs of the {} on the same input differ in {} words of '{}', first {}: it reads "
+        "memory that nobody wrote, or its threads race",
+        module, differing.words, out.name, where(out, differing.first * kWord)));
 }
 
-Bytes elementsIn(const Output& out, const Bytes& whole) {
-  const auto begin = whole.begin() + static_cast<std::ptrdiff_t>(out.before);
-  return {begin, begin + static_cast<std::ptrdiff_t>(out.dataBytes())};
+std::span<const std::byte> elementsIn(const Output& out, const Bytes& whole) {
+  return std::span(whole).subspan(out.before, out.dataBytes());
 }
 
-/// Both runs of one module; returns the elements of the first.
-std::map<std::string, Bytes> observeModule(const Subject& subject, Setup& setup,
-                                           const GpuProgram& program, const Stimulus& stimulus,
-                                           const char* module, std::vector<std::string>& findings) {
-  std::vector<Bytes> runs[2];
-  uploadInputs(subject.gpu(), setup);
-  for (int i : {0, 1}) runs[i] = runOnce(subject, setup, program, kPoison[i], stimulus.limit);
-  for (const Input& in : setup.inputs) checkInput(findings, subject.gpu(), in, module);
-  std::map<std::string, Bytes> data;
-  for (std::size_t o = 0; o < setup.outputs.size(); ++o) {
-    const Output& out = setup.outputs[o];
-    for (int i : {0, 1}) checkGuards(findings, out, runs[i][o], kPoison[i], module);
-    const auto elements = [&](int i) {
-      return std::span<const std::byte>(runs[i][o]).subspan(out.before, out.dataBytes());
-    };
-    checkWords(findings, out, elements(0), elements(1), subject.record().deterministic, module);
-    data[out.spec->name] = elementsIn(out, runs[0][o]);
+/// Everything that is watched while one subject runs.
+class Observer {
+ public:
+  Observer(const Subject& s, Resources& r, Observation& o) : subject(s), resources(r), seen(o) {}
+
+  /// Both runs of one module; keeps the elements of the first.
+  void watch(const GpuProgram& program, const std::string& module,
+             std::map<std::string, Bytes>& outputs) {
+    resources.upload(kPoison[0]);
+    const std::vector<Bytes> runs[2] = {resources.run(program, kPoison[0]),
+                                        resources.run(program, kPoison[1])};
+    for (const Input& in : resources.inputs())
+      checkInput(seen.findings, in, resources.download(in), module);
+    for (std::size_t o = 0; o < resources.outputs().size(); ++o) {
+      const Output& out = resources.outputs()[o];
+      checkGuards(seen.findings, out, runs[0][o], kPoison[0], module);
+      const auto data = elementsIn(out, runs[0][o]);
+      checkWords(seen.findings, out, data, elementsIn(out, runs[1][o]),
+                 subject.record().deterministic, module);
+      outputs.try_emplace(out.name, data.begin(), data.end());
+    }
   }
-  return data;
+
+  /// The order twin against what the strict twin gave.
+  void compareOrder() {
+    if (subject.orderTwin() == nullptr || !subject.record().deterministic) return;
+    resources.upload(kPoison[0]);
+    const std::vector<Bytes> runs = resources.run(*subject.orderTwin(), kPoison[0]);
+    for (std::size_t o = 0; o < runs.size(); ++o) {
+      const Output& out = resources.outputs()[o];
+      const auto turned = elementsIn(out, runs[o]);
+      const Bytes& straight = seen.twin.at(out.name);
+      Difference differing;
+      for (std::size_t i = 0; i < straight.size() / kWord; ++i)
+        if (wordAt(straight, i) != wordAt(turned, i)) differing.note(i);
+      if (differing.words > 0)
+        seen.findings.push_back(fmt::format(
+            "with the order of its groups and of the subgroups in a group turned round, {} of {} "
+            "words of '{}' differ, first {}: a barrier is missing, or its groups race",
+            differing.words, straight.size() / kWord, out.name,
+            where(out, differing.first * kWord)));
+    }
+  }
+
+ private:
+  const Subject& subject;
+  Resources& resources;
+  Observation& seen;
+};
+
+bool writesNarrow(const Subject& subject, const Stimulus& stimulus) {
+  return std::ranges::any_of(stimulus.outputImages, [&](const OutputImage& o) {
+    return isNarrow(subject.record().image(o.image).format);
+  });
 }
 
 }  // namespace
 
 Observation observe(const Subject& subject, const Stimulus& stimulus) {
   Observation seen;
-  Setup setup = prepare(subject, stimulus);
-  seen.plain = observeModule(subject, setup, subject.plain(), stimulus, "kernel", seen.findings);
-  seen.twin = observeModule(subject, setup, subject.twin(), stimulus, "strict twin", seen.findings);
+  {
+    Resources resources(subject, stimulus, Target::kFloat);
+    Observer observer(subject, resources, seen);
+    observer.watch(subject.plain(), "kernel", seen.plain);
+    observer.watch(subject.twin(), "strict twin", seen.twin);
+    observer.compareOrder();
+  }
+  if (writesNarrow(subject, stimulus)) {
+    Resources resources(subject, stimulus, Target::kContract);
+    Observer observer(subject, resources, seen);
+    observer.watch(subject.plain(), "kernel", seen.plain);
+    observer.watch(subject.twin(), "strict twin", seen.twin);
+  }
   for (const std::string& message : subject.gpu().takeMessages())
     seen.findings.push_back("validation layer: " + message);
   return seen;
 }
 
 std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus) {
-  Setup setup = prepare(subject, stimulus);
-  uploadInputs(subject.gpu(), setup);
-  const std::vector<Bytes> whole =
-      runOnce(subject, setup, subject.twin(), kPoison[0], stimulus.limit);
-  std::map<std::string, Bytes> data;
-  for (std::size_t o = 0; o < whole.size(); ++o)
-    data[setup.outputs[o].spec->name] = elementsIn(setup.outputs[o], whole[o]);
-  return data;
+  Resources resources(subject, stimulus, Target::kFloat);
+  resources.upload(kPoison[0]);
+  const std::vector<Bytes> whole = resources.run(subject.twin(), kPoison[0]);
+  std::map<std::string, Bytes> outputs;
+  for (std::size_t o = 0; o < whole.size(); ++o) {
+    const Output& out = resources.outputs()[o];
+    const auto data = elementsIn(out, whole[o]);
+    outputs.try_emplace(out.name, data.begin(), data.end());
+  }
+  return outputs;
 }
 
 }  // namespace gnomon

@@ -1,41 +1,21 @@
 // Runs a kernel so that whatever it leaves undone or does out of place is seen (design: hygiene).
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <map>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "harness/hygiene/subject.h"
+#include "harness/hygiene/resources.h"
 
 namespace gnomon {
 
-struct InputBytes {
-  std::string buffer{};
-  std::span<const std::byte> bytes{};
-};
-
-struct OutputCount {
-  std::string buffer{};
-  std::size_t elements = 0;
-};
-
-/// What one kernel is to do: inputs by buffer name, how many elements each output has.
-struct Stimulus {
-  std::vector<InputBytes> inputs{};
-  std::vector<OutputCount> outputs{};
-  std::span<const std::byte> push{};
-  std::size_t items = 0;  ///< for the grid rule
-  std::chrono::milliseconds limit{60'000};
-};
-
-/// What it did.
+/// What it did: outputs by name. An image is 32-bit scalars, r g b a of each pixel, written into a
+/// float image; where its format is narrow, it is there a second time as stored in that format and
+/// read back, under narrowName().
 struct Observation {
-  std::map<std::string, std::vector<std::byte>> plain{};  ///< outputs of the module as it is
-  std::map<std::string, std::vector<std::byte>> twin{};   ///< outputs of its strict twin
-  std::vector<std::string> findings{};  ///< hygiene: one sentence each; empty if clean
+  std::map<std::string, Bytes> plain{};  ///< outputs of the module as it is
+  std::map<std::string, Bytes> twin{};   ///< outputs of its strict twin
+  std::vector<std::string> findings{};   ///< hygiene: one sentence each; empty if clean
 };
 
 /// Outputs and guard bands are poisoned before every run, with one pattern in the first and another
@@ -44,15 +24,17 @@ struct Observation {
 /// Inputs end in a guard band of NaN, so reading past the end poisons a result. Guard bands lie
 /// inside the bound range: a driver that clips accesses to the range must not hide a stray write.
 ///
+/// A kernel whose threads communicate also runs as its order twin (harness/program/order.h), which
+/// has to give the same words: where it does not, a barrier is missing or groups race.
+///
 /// Findings: words not written, writes outside, writes into inputs, runs that differ though the
-/// contract says deterministic, validation messages. Throws GpuError when the device is lost or the
-/// limit passes.
+/// contract says deterministic, an order twin that differs, validation messages. Throws GpuError
+/// when the device is lost or the limit passes.
 Observation observe(const Subject& subject, const Stimulus& stimulus);
 
 /// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so
 /// many that checking each would take hours. What is measured so has to be observed on a part
 /// first.
-std::map<std::string, std::vector<std::byte>> runTwinOnce(const Subject& subject,
-                                                          const Stimulus& stimulus);
+std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus);
 
 }  // namespace gnomon

@@ -1,9 +1,12 @@
 #include "harness/hygiene/subject.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "harness/error.h"
+#include "harness/program/order.h"
 #include "harness/program/reflect.h"
 
 namespace gnomon {
@@ -17,9 +20,17 @@ void refuseWhatContradicts(const KernelRecord& record, const Reflection& reflect
                                  fmt::join(lines, "\n  ")));
 }
 
+bool readsWhatItWrites(const Reflection& reflection) {
+  return std::ranges::any_of(reflection.bindings, [](const ReflectedBinding& b) {
+    return b.kind.starts_with("storage") && !b.readOnly && !b.writeOnly;
+  });
+}
+
 ProgramDescription description(const KernelRecord& record, SpirvWords module) {
   ProgramDescription d{.spirv = std::move(module)};
   for (const BufferSpec& b : record.buffers) d.slots.push_back({.set = 0, .binding = b.binding});
+  for (const ImageSpec& i : record.images)
+    d.slots.push_back({.set = 0, .binding = i.binding, .kind = i.kind()});
   d.pushBytes = record.push.size;
   d.specialization = record.specialization;
   return d;
@@ -30,10 +41,15 @@ ProgramDescription description(const KernelRecord& record, SpirvWords module) {
 Subject::Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::string origin)
     : device(&gpu), contract(&record), file(std::move(origin)) {
   if (const auto why = gpu.info().lacks(record.features)) throw Unsupported(*why);
-  refuseWhatContradicts(record, reflect(module), file);
+  const Reflection reflection = reflect(module);
+  refuseWhatContradicts(record, reflection, file);
   const StrictOptions strict{.signedZeroInfNanPreserve = gpu.info().signedZeroInfNanFloat32,
                              .roundingModeRte = gpu.info().roundingRteFloat32};
-  twinProgram = gpu.build(description(record, strictTwin(module, strict)));
+  const SpirvWords twinModule = strictTwin(module, strict);
+  twinProgram = gpu.build(description(record, twinModule));
+  if (readsWhatItWrites(reflection) || threadsCommunicate(module))
+    turned = gpu.build(description(
+        record, gnomon::orderTwin(twinModule, {.subgroupSize = gpu.info().subgroupSize})));
   plainProgram = gpu.build(description(record, std::move(module)));
 }
 

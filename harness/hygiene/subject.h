@@ -1,6 +1,7 @@
 // The kernel under test on one device: its module and its strict twin, ready to run.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "harness/program/kernel.h"
@@ -21,6 +22,9 @@ class Subject {
   Gpu& gpu() const { return *device; }
   const GpuProgram& plain() const { return plainProgram; }
   const GpuProgram& twin() const { return twinProgram; }
+  /// The strict twin with the order of groups and subgroups turned round, for a kernel whose
+  /// threads communicate; null for any other.
+  const GpuProgram* orderTwin() const { return turned ? &*turned : nullptr; }
 
  private:
   Gpu* device;
@@ -28,6 +32,7 @@ class Subject {
   std::string file;
   GpuProgram plainProgram;
   GpuProgram twinProgram;
+  std::optional<GpuProgram> turned;
 };
 
 }  // namespace gnomon

@@ -16,6 +16,16 @@ std::vector<KernelRecord>& records() {
   return all;
 }
 
+// A record that has no such thing is a mistake in the code that asks.
+template <class Spec>
+const Spec& named(const KernelRecord& record, const std::vector<Spec>& all, std::string_view called,
+                  const char* what) {
+  const auto found = std::ranges::find(all, called, &Spec::name);
+  if (found == all.end())
+    throw std::logic_error(fmt::format("{} has no {} '{}'", record.name(), what, called));
+  return *found;
+}
+
 Field typed(const char* type, ScalarType scalar, unsigned scalars) {
   return {.name = {}, .type = type, .scalar = scalar, .scalars = scalars};
 }
@@ -44,27 +54,55 @@ void compareMembers(std::vector<std::string>& lines, const std::string& where, c
                                   m.path, m.type));
 }
 
-void compareBuffer(std::vector<std::string>& lines, const BufferSpec& ours,
-                   const Reflection& reflection) {
-  const auto found = std::ranges::find(reflection.bindings, ours.name, &ReflectedBinding::name);
+// The binding of that name, if it stands where the contract has it.
+const ReflectedBinding* compareBinding(std::vector<std::string>& lines, const char* what,
+                                       const std::string& name, unsigned binding,
+                                       const Reflection& reflection) {
+  const auto found = std::ranges::find(reflection.bindings, name, &ReflectedBinding::name);
   if (found == reflection.bindings.end()) {
     lines.push_back(
-        fmt::format("the shader has no buffer '{}', which the contract binds at set 0, "
-                    "binding {}",
-                    ours.name, ours.binding));
+        fmt::format("the shader has no {} '{}', which the contract binds at set 0, binding {}",
+                    what, name, binding));
+    return nullptr;
+  }
+  if (found->set != 0 || found->binding != binding)
+    lines.push_back(fmt::format(
+        "'{}' is at set {}, binding {} in the shader, set 0, binding {} in the contract", name,
+        found->set, found->binding, binding));
+  return &*found;
+}
+
+void compareBuffer(std::vector<std::string>& lines, const BufferSpec& ours,
+                   const Reflection& reflection) {
+  const ReflectedBinding* theirs =
+      compareBinding(lines, "buffer", ours.name, ours.binding, reflection);
+  if (theirs == nullptr) return;
+  if (theirs->kind != "storage buffer") {
+    lines.push_back(fmt::format("'{}' is a {} in the shader, a storage buffer in the contract",
+                                ours.name, theirs->kind));
     return;
   }
-  if (found->set != 0 || found->binding != ours.binding)
+  if (theirs->stride != ours.element.size)
     lines.push_back(
-        fmt::format("'{}' is at set {}, binding {} in the shader, set 0, binding {} in "
-                    "the contract",
-                    ours.name, found->set, found->binding, ours.binding));
-  if (found->stride != ours.element.size)
-    lines.push_back(
-        fmt::format("an element of '{}' takes {} bytes in the shader, {} in the "
-                    "contract",
-                    ours.name, found->stride, ours.element.size));
-  compareMembers(lines, ours.name, ours.element, found->members);
+        fmt::format("an element of '{}' takes {} bytes in the shader, {} in the contract",
+                    ours.name, theirs->stride, ours.element.size));
+  compareMembers(lines, ours.name, ours.element, theirs->members);
+}
+
+void compareImage(std::vector<std::string>& lines, const ImageSpec& ours,
+                  const Reflection& reflection) {
+  const ReflectedBinding* theirs =
+      compareBinding(lines, "image", ours.name, ours.binding, reflection);
+  if (theirs == nullptr) return;
+  if (theirs->type != ours.type)
+    lines.push_back(fmt::format("'{}' is {} in the shader, {} in the contract", ours.name,
+                                theirs->type.empty() ? "a " + theirs->kind : theirs->type,
+                                ours.type));
+}
+
+bool bindsNothingOf(const KernelRecord& record, const std::string& name) {
+  return std::ranges::find(record.buffers, name, &BufferSpec::name) == record.buffers.end() &&
+         std::ranges::find(record.images, name, &ImageSpec::name) == record.images.end();
 }
 
 }  // namespace
@@ -75,17 +113,46 @@ unsigned Struct::scalars() const {
   return n;
 }
 
-const BufferSpec& KernelRecord::buffer(std::string_view called) const {
-  const auto found = std::ranges::find(buffers, called, &BufferSpec::name);
-  if (found == buffers.end())
-    throw std::logic_error(fmt::format("{} has no buffer '{}'", name(), called));
-  return *found;
+BindingSlot::Kind ImageSpec::kind() const {
+  if (type.starts_with("image")) return BindingSlot::Kind::kStorageImage;
+  if (type.starts_with("sampler")) return BindingSlot::Kind::kCombined;
+  return BindingSlot::Kind::kSampledImage;
 }
 
-std::function<std::array<std::uint32_t, 3>(std::size_t)> linearGrid(unsigned size) {
-  return [size](std::size_t items) {
-    const std::size_t groups = std::max<std::size_t>(1, (items + size - 1) / size);
-    return std::array<std::uint32_t, 3>{static_cast<std::uint32_t>(groups), 1, 1};
+Struct pixelLayout(PixelFormat format) {
+  const ScalarType scalar = format == PixelFormat::kR32ui ? ScalarType::kUint : ScalarType::kFloat;
+  const unsigned n = channels(format);
+  Struct pixel{.name = "pixel", .size = 4 * n, .fields = {}};
+  for (unsigned c = 0; c < n; ++c)
+    pixel.fields.push_back({.name = std::string(1, "rgba"[c]),
+                            .type = scalar == ScalarType::kUint ? "uint" : "float",
+                            .scalar = scalar,
+                            .offset = 4 * c,
+                            .scalars = 1});
+  return pixel;
+}
+
+const BufferSpec& KernelRecord::buffer(std::string_view called) const {
+  return named(*this, buffers, called, "buffer");
+}
+
+const ImageSpec& KernelRecord::image(std::string_view called) const {
+  return named(*this, images, called, "image");
+}
+
+Struct KernelRecord::layoutOf(std::string_view output) const {
+  const auto found = std::ranges::find(images, output, &ImageSpec::name);
+  return found != images.end() ? pixelLayout(found->format) : buffer(output).element;
+}
+
+Grid coveringGrid(const std::array<unsigned, 3>& groupSize) {
+  return [groupSize](const Extent& extent) {
+    const std::array sizes = {extent.width, extent.height, extent.depth};
+    std::array<std::uint32_t, 3> groups{};
+    for (std::size_t i = 0; i < groups.size(); ++i)
+      groups[i] = static_cast<std::uint32_t>(
+          std::max<std::size_t>(1, (sizes[i] + groupSize[i] - 1) / groupSize[i]));
+    return groups;
   };
 }
 
@@ -115,8 +182,9 @@ const KernelRecord& findKernel(std::string_view name) {
 std::vector<std::string> contradictions(const KernelRecord& record, const Reflection& reflection) {
   std::vector<std::string> lines;
   for (const BufferSpec& b : record.buffers) compareBuffer(lines, b, reflection);
+  for (const ImageSpec& i : record.images) compareImage(lines, i, reflection);
   for (const ReflectedBinding& b : reflection.bindings)
-    if (std::ranges::find(record.buffers, b.name, &BufferSpec::name) == record.buffers.end())
+    if (bindsNothingOf(record, b.name))
       lines.push_back(
           fmt::format("the shader binds {} '{}' (set {}, binding {}), which the contract "
                       "does not know",

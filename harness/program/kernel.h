@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "harness/program/reflect.h"
+#include "harness/vulkan/gpu.h"
 #include "kernels/contract.h"
 
 namespace gnomon {
@@ -83,6 +84,29 @@ struct BufferSpec {
   Struct element;
 };
 
+/// An image that a kernel reads (fetching or sampling) or writes.
+struct ImageSpec {
+  std::string name{};  ///< the GLSL variable
+  unsigned binding = 0;
+  Access access = Access::kRead;
+  std::string type{};  ///< GLSL spelling: "texture2D", "sampler2DArray", "image2D"
+  PixelFormat format = PixelFormat::kRgba8;  ///< of it in a frame
+  SamplerDescription sampler{};              ///< where the type is a sampler
+
+  BindingSlot::Kind kind() const;
+};
+
+/// A pixel as a struct of 32-bit scalars r, g, b, a: how outputs that are images are judged.
+Struct pixelLayout(PixelFormat format);
+
+/// What a kernel covers: elements of its buffers, or pixels.
+struct Extent {
+  std::size_t width = 1, height = 1, depth = 1;
+  std::size_t count() const { return width * height * depth; }
+};
+
+using Grid = std::function<std::array<std::uint32_t, 3>(const Extent&)>;
+
 /// One entry of a stage: everything a run of it needs to know.
 struct KernelRecord {
   int order = 0;        ///< of the stage, as a frame runs them (README's stage table)
@@ -90,10 +114,10 @@ struct KernelRecord {
   std::string entry{};  ///< "evaluate"
   std::string file{};   ///< under kernels/
   std::vector<BufferSpec> buffers{};
+  std::vector<ImageSpec> images{};
   Struct push;
   std::array<unsigned, 3> groupSize{1, 1, 1};
-  /// Groups for a number of items.
-  std::function<std::array<std::uint32_t, 3>(std::size_t items)> grid;
+  Grid grid;
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
   bool deterministic = true;  ///< two runs on the same input agree to the bit
@@ -101,11 +125,14 @@ struct KernelRecord {
 
   std::string name() const { return stage + "/" + entry; }
   const BufferSpec& buffer(std::string_view called) const;
+  const ImageSpec& image(std::string_view called) const;
+  /// Of an element of that buffer or a pixel of that image.
+  Struct layoutOf(std::string_view output) const;
 };
 
-/// Groups of `size` threads in x that cover the items; at least one, so that an empty input still
+/// Groups of that many threads that cover the extent; at least one, so that an empty input still
 /// runs the kernel's guard.
-std::function<std::array<std::uint32_t, 3>(std::size_t)> linearGrid(unsigned size);
+Grid coveringGrid(const std::array<unsigned, 3>& groupSize);
 
 /// Adds a record to the catalogue; at namespace scope in kernels/<stage>/<stage>.cpp.
 bool registerKernel(KernelRecord record);

@@ -519,4 +519,14 @@ SpirvWords orderTwin(std::span<const std::uint32_t> module, const OrderOptions& 
   return OrderTwin(parsed, options).words();
 }
 
+bool threadsCommunicate(std::span<const std::uint32_t> module) {
+  const SpirvModule parsed = parseSpirv(module);
+  return std::ranges::any_of(parsed.instructions, [&](const SpirvInstruction& i) {
+    const auto words = parsed.wordsOf(i);
+    if (i.opcode == spv::OpCapability) return isOfSubgroups(words[1]);
+    if (i.opcode == spv::OpVariable) return words[3] == spv::StorageClassWorkgroup;
+    return i.opcode >= spv::OpAtomicLoad && i.opcode <= spv::OpAtomicXor;
+  });
+}
+
 }  // namespace gnomon

@@ -35,4 +35,8 @@ struct OrderOptions {
 /// compute shader, or where a built-in stands in a struct; the twin of a valid module is valid.
 SpirvWords orderTwin(std::span<const std::uint32_t> module, const OrderOptions& options);
 
+/// Whether its threads can learn of each other by shared memory, atomics or subgroup operations; by
+/// storage that is both read and written, its interface tells. Throws UsageError as orderTwin does.
+bool threadsCommunicate(std::span<const std::uint32_t> module);
+
 }  // namespace gnomon

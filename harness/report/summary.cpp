@@ -26,6 +26,8 @@ void add(KernelSummary& sum, const CaseRecord& record) {
     sum.reassociated += v.reassociated;
     sum.verdict = std::max(sum.verdict, v.verdict);
     sum.widening = std::max(sum.widening, v.widening);
+    // Half of what a narrow format stores is an end of its interval, which says nothing.
+    if (v.storage != Storage::float32 && v.maxBudget() <= 1) continue;
     sum.maxBudget = std::max(sum.maxBudget.value_or(0), v.maxBudget());
     sum.exact &= std::ranges::all_of(v.fields, [](const auto& f) { return f.specWidth == 0; });
   }
@@ -63,6 +65,7 @@ nlohmann::json domainsOf(const KernelSummary& k) {
     for (const Verdict& v : r->verdicts)
       for (const FieldVerdict& f : v.fields)
         list.push_back({{"case", r->name},
+                        {"output", v.output},
                         {"field", f.name},
                         {"elements", v.elements},
                         {"judgedByIntervals", v.bounded},

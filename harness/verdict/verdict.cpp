@@ -64,6 +64,12 @@ void keepWorse(std::optional<Offender>& worst, Offender candidate) {
     worst = std::move(candidate);
 }
 
+/// "results[12]" or "target(3, 5)".
+std::string placeOf(const Expectation& e, std::size_t element) {
+  if (e.width == 0) return fmt::format("{}[{}]", e.output, element);
+  return fmt::format("{}({}, {})", e.output, element % e.width, element / e.width);
+}
+
 /// The model's value where the interval holds it, else the end next to it.
 double centre(const Bounded& b) { return std::clamp(b.value, b.lo, b.hi); }
 
@@ -85,9 +91,10 @@ class Judge {
         policy(p),
         seed(s),
         scalars(scalarsOf(structure)),
-        twin(seen.twin.at(e.buffer), structure.size),
-        plain(seen.plain.at(e.buffer), structure.size) {
-    result.buffer = e.buffer;
+        twin(seen.twin.at(e.output), structure.size),
+        plain(seen.plain.at(e.output), structure.size) {
+    result.output = e.output;
+    result.storage = e.storage;
     result.elements = e.elements;
     result.problems = seen.findings;
     result.fields.resize(structure.fields.size());
@@ -173,11 +180,19 @@ class Judge {
           scalars[s].type != ScalarType::kFloat || (scalars[s].signOfZero && values[s] == 0);
       if (exact && slack[s] > 0) return false;
       const double x = values[s], room = slack[s] * std::abs(x);
-      // Written so that a NaN on either side does not clear.
-      if (!(std::abs(twin(i, scalars[s]) - x) <= room)) return false;
-      if (!(std::abs(plain(i, scalars[s]) - x) <= room)) return false;
+      if (!isNear(twin(i, scalars[s]), x, room) || !isNear(plain(i, scalars[s]), x, room))
+        return false;
     }
     return true;
+  }
+
+  /// Within `room` of x; in a narrow format, what every number within `room` may be stored as.
+  /// Written so that a NaN on either side is not near.
+  bool isNear(double got, double x, double room) const {
+    if (expected.storage == Storage::float32) return std::abs(got - x) <= room;
+    const Bounded low = stored(Bounded::between(x - room, x - room), expected.storage);
+    const Bounded high = stored(Bounded::between(x + room, x + room), expected.storage);
+    return high.lo <= got && got <= low.hi;
   }
 
   void judgeAll(const std::vector<std::size_t>& elements, bool measureWidths) {
@@ -186,6 +201,7 @@ class Judge {
       Intervals allowed(scalars.size());
       for (std::size_t k = begin; k < end; ++k) {
         evaluate(deciding(), elements[k], allowed.device);
+        if (!measureWidths) store(allowed.device);
         if (!measureWidths && admitsBoth(elements[k], allowed.device)) {
           const std::lock_guard lock(mutex);
           noteBudgets(elements[k], allowed.device);
@@ -194,8 +210,11 @@ class Judge {
         evaluate(bounds.spec, elements[k], allowed.spec);
         evaluate(bounds.plain, elements[k], allowed.plain);
         const std::lock_guard lock(mutex);
+        if (measureWidths) measure(allowed);  // of the arithmetic, before a format rounds it
+        store(allowed.spec);
+        store(allowed.plain);
+        if (measureWidths) store(allowed.device);
         account(elements[k], allowed);
-        if (measureWidths) measure(allowed);
       }
     });
   }
@@ -220,6 +239,11 @@ class Judge {
   void evaluate(const Rules& rules, std::size_t i, std::vector<Bounded>& out) const {
     const UseRules scope(rules);
     expected.bounded(i, out);
+  }
+
+  void store(std::vector<Bounded>& all) const {
+    if (expected.storage == Storage::float32) return;
+    for (Bounded& x : all) x = stored(x, expected.storage);
   }
 
   void account(std::size_t i, const Intervals& allowed) {
@@ -259,10 +283,10 @@ class Judge {
     if (!b.unspecified() || unspecifiedSeen) return;
     unspecifiedSeen = true;
     result.problems.push_back(fmt::format(
-        "the model of {}[{}].{} reaches '{}' outside the domain in which Vulkan "
+        "the model of {}.{} reaches '{}' outside the domain in which Vulkan "
         "specifies it, so nothing can be judged there: the test asks too much, or the "
         "kernel's contract must avoid it",
-        result.buffer, i, scalars[s].name, nameOf(unspecifiedOperations(b.flags).front())));
+        placeOf(expected, i), scalars[s].name, nameOf(unspecifiedOperations(b.flags).front())));
   }
 
   void measure(const Intervals& allowed) {
@@ -347,6 +371,7 @@ class Judge {
   bool inside(std::size_t i) const {
     std::vector<Bounded> allowed(scalars.size());
     expected.bounded(i, allowed);
+    store(allowed);
     for (std::size_t s = 0; s < scalars.size(); ++s) {
       const double got = twin(i, scalars[s]);
       // Widening turns an exact zero into an interval; its sign stays the contract's.
@@ -382,8 +407,8 @@ std::string fieldTable(const Verdict& v) {
   return table;
 }
 
-std::string worstElement(const Offender& o, const Verdict& v, const Expectation& expected) {
-  std::string text = fmt::format("worst: {}[{}].{}\n", v.buffer, o.element, o.field);
+std::string worstElement(const Offender& o, const Expectation& expected) {
+  std::string text = fmt::format("worst: {}.{}\n", placeOf(expected, o.element), o.field);
   text += fmt::format("  got       {} (strict twin), {} (module as it is)\n", number(o.got),
                       number(o.gotPlain));
   text += fmt::format("  allowed   [{}, {}]\n", number(o.lo), number(o.hi));
@@ -449,14 +474,14 @@ std::string explain(const Verdict& v, const Expectation& expected) {
   if (first != nullptr) {
     text +=
         fmt::format("{} of {} elements of '{}' are outside what {} may return\n", out,
-                    out < v.bounded / 100 ? v.elements : v.bounded, v.buffer,
+                    out < v.bounded / 100 ? v.elements : v.bounded, v.output,
                     v.outside > 0 ? "a conforming device" : "this device, by its measured errors,");
     text += fieldTable(v);
     text += fmt::format("The first field that is wrong, in the order of the contract, is {}.\n",
                         first->name);
   }
   const std::optional<Offender>& worst = first != nullptr ? first->worst : v.worst;
-  if (worst && worst->budget > 1) text += worstElement(*worst, v, expected);
+  if (worst && worst->budget > 1) text += worstElement(*worst, expected);
   return text;
 }
 

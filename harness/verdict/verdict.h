@@ -12,6 +12,7 @@
 #include "harness/verdict/policy.h"
 #include "reference/bound/bounded.h"
 #include "reference/bound/rules.h"
+#include "reference/bound/storage.h"
 
 namespace gnomon {
 
@@ -21,8 +22,11 @@ void PrintTo(Class c, std::ostream* out);  // GoogleTest's hook
 
 /// What the outputs must be, for every element; scalars in the order of the contract's fields.
 struct Expectation {
-  std::string buffer;
+  std::string output;  ///< as the observation calls it
   std::size_t elements = 0;
+  unsigned width = 0;  ///< pixels in a row of an image; 0: a buffer
+  /// Format that every scalar is stored in and read back from: the observation's narrow copy.
+  Storage storage = Storage::float32;
   /// The first `corners` elements are corner cases and are always judged by intervals.
   std::size_t corners = 0;
   bool judgesRules = false;  ///< what is judged are the rules themselves, however wide they are
@@ -69,7 +73,8 @@ struct FieldVerdict {
 struct Verdict {
   Class verdict = Class::kConforms;
   int widening = 0;  ///< k of `equivalent`
-  std::string buffer;
+  std::string output;
+  Storage storage = Storage::float32;  ///< that the output was read back from
   std::size_t elements = 0;
   /// Of them judged by intervals. The rest was cleared by the model; or left alone, where the first
   /// thousands showed that the kernel is wrong at large.

@@ -30,7 +30,7 @@ const bool registered = registerKernel({
                 {"results", kResults, Access::kWrite, shaded()}},
     .push = describe<Evaluate>("Evaluate", field("count", &Evaluate::count)),
     .groupSize = {kGroupSize, 1, 1},
-    .grid = linearGrid(kGroupSize),
+    .grid = coveringGrid({kGroupSize, 1, 1}),
     .features = {"scalarBlockLayout"},
     .deterministic = true,
     .summary = "Cook-Torrance D, G, F, lobes and shaded radiance for arrays of inputs",

@@ -4,6 +4,8 @@
 
 bool isFinite(float x) { return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u; }
 
+bool isPositiveInfinity(float x) { return floatBitsToUint(x) == 0x7f800000u; }
+
 float finiteOrZero(float x) { return isFinite(x) ? x : 0.0; }
 
 vec3 finiteOrZero(vec3 v) { return vec3(finiteOrZero(v.x), finiteOrZero(v.y), finiteOrZero(v.z)); }

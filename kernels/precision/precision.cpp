@@ -21,7 +21,7 @@ KernelRecord entry(const char* name, uint operation) {
                    describe<Result>("Result", field("value", &Result::value))}},
       .push = describe<Measure>("Measure", field("count", &Measure::count)),
       .groupSize = {kGroupSize, 1, 1},
-      .grid = linearGrid(kGroupSize),
+      .grid = coveringGrid({kGroupSize, 1, 1}),
       .features = {"scalarBlockLayout"},
       .specialization = {{kOperationId, operation}},
       .deterministic = true,

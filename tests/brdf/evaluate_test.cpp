@@ -28,7 +28,7 @@ class BrdfEvaluate : public KernelCase {
     return run({.inputs = {{"samples", std::as_bytes(std::span(samples))}},
                 .outputs = {{"results", samples.size()}},
                 .push = std::as_bytes(std::span(&push, 1)),
-                .items = samples.size()});
+                .extent = {samples.size()}});
   }
 
   std::vector<Shaded> shade(const std::vector<Sample>& samples) {

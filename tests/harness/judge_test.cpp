@@ -45,7 +45,7 @@ KernelRecord recordOf(bool signOfZero = false) {
                   {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
       .push = describe<Push>("Push", field("count", &Push::count)),
       .groupSize = {64, 1, 1},
-      .grid = linearGrid(64),
+      .grid = coveringGrid({64, 1, 1}),
       .features = {"scalarBlockLayout"}};
 }
 
@@ -92,7 +92,7 @@ class Judge : public testing::Test {
         observe(subject, {.inputs = {{"values", std::as_bytes(std::span(values))}},
                           .outputs = {{"results", values.size()}},
                           .push = std::as_bytes(std::span(&push, 1)),
-                          .items = values.size()});
+                          .extent = {values.size()}});
     expected = expectationOf(
         "results", values.size(),
         [values, f]<class T>(std::size_t i) { return NumberOf<T>{f(input<T>(values[i].x))}; },

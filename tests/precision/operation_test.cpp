@@ -222,7 +222,7 @@ class OperationCase : public KernelCase {
     return run({.inputs = {{"arguments", std::as_bytes(std::span(arguments))}},
                 .outputs = {{"results", arguments.size()}},
                 .push = std::as_bytes(std::span(&push, 1)),
-                .items = arguments.size()});
+                .extent = {arguments.size()}});
   }
 
   const Subject& subject;
@@ -307,7 +307,7 @@ class WorstErrorIsMeasured : public OperationCase {
         runTwinOnce(kernel, {.inputs = {{"arguments", std::as_bytes(std::span(arguments))}},
                              .outputs = {{"results", arguments.size()}},
                              .push = std::as_bytes(std::span(&push, 1)),
-                             .items = arguments.size(),
+                             .extent = {arguments.size()},
                              .limit = Session::current().limit()});
     return elementsOf<Result>(bytes.at("results"));
   }
