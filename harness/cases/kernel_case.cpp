@@ -77,12 +77,4 @@ std::size_t generated(const char* policyName) {
   return session.options().cases.value_or(static_cast<std::size_t>(session.policy()[policyName]));
 }
 
-InputImage floatImage(std::string image, const Picture& picture) {
-  return {.image = std::move(image),
-          .description = {.format = PixelFormat::kRgba32f,
-                          .width = picture.size.x,
-                          .height = picture.size.y},
-          .texels = std::as_bytes(std::span(picture.texels))};
-}
-
 }  // namespace gnomon

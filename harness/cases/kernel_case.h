@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "harness/cases/picture.h"
 #include "harness/cases/session.h"
 #include "harness/hygiene/observe.h"
 #include "harness/verdict/verdict.h"
@@ -64,19 +65,6 @@ std::vector<T> elementsOf(const std::vector<std::byte>& bytes) {
   if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
   return all;
 }
-
-/// A picture on the host: rows from the top, x fastest, components as the kernel sees them.
-struct Picture {
-  uvec2 size{1, 1};
-  std::vector<vec4> texels{};
-
-  const vec4& at(std::size_t pixel) const { return texels[pixel]; }
-  std::size_t pixels() const { return texels.size(); }
-};
-
-/// An input image of 32-bit floats, so that a kernel sees the picture's own numbers. The picture
-/// must outlive it.
-InputImage floatImage(std::string image, const Picture& picture);
 
 /// Calls f for every number of a model's result, in the order of its scalars().
 template <class T, class F>

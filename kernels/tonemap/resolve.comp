@@ -15,7 +15,7 @@ layout(set = 0, binding = kBloom) uniform texture2D bloom;
 layout(set = 0, binding = kTarget) writeonly uniform image2D target;
 
 float safe(float x) {
-  if (isFinite(x)) return x;
+  if (isFinite(x)) return clamp(x, -kMaxScene, kMaxScene);
   return isPositiveInfinity(x) ? kMaxScene : 0.0;
 }
 

@@ -13,7 +13,8 @@ GNOMON_CONTRACT(tonemap)
 //   target  = (transfer(display), 1)
 // Bloom has any size: it is filtered bilinearly between texel centres, clamped to its edge. Bad
 // input is part of the contract: a component of hdr or of a texel of bloom that is NaN or -Inf
-// counts as 0, +Inf as kMaxScene, before anything is computed with it.
+// counts as 0, +Inf as kMaxScene, and any other is clamped to [-kMaxScene, kMaxScene], before
+// anything is computed with it.
 struct Resolve {         // push constants
   uvec2 size;            // of hdr and target, pixels; pixels beyond are not touched
   float exposure;        // 2^EV, computed on the host; 2^-32 to 2^32
@@ -30,7 +31,7 @@ const uint kHill = 3;       // Hill 2016, RRT and sRGB ODT fit; mixes the compon
 
 // Transfer functions.
 const uint kNone = 0;   // for a target whose format encodes
-const uint kGamma = 1;  // x^(1 / 2.2)
+const uint kGamma = 1;  // x^(1 / 2.2); 0 below 2^-126, the smallest normal float
 const uint kSrgb = 2;   // IEC 61966-2-1
 
 const float kMaxScene = 4292870144.0f;  // 65504 * 2^16: the largest half at EV 16

@@ -1,8 +1,8 @@
 // post/views: every debug view against its model.
 //
 // Covered: albedo, normal, depth and cascades inside their intervals, over pictures whose sides are
-// no multiples of a group and over tiny ones; a frame's own formats; sky; distances around every
-// split and blend zone; bad input; an unknown mode; the linearisation against the projection it
+// no multiples of a group and over tiny ones; sky; distances around every split and blend zone; bad
+// input; an unknown mode; the linearisation against the projection it
 // inverts, and at both planes.
 // Not covered: the tile-light heat map (it comes with the lights).
 #include <array>
