@@ -362,15 +362,21 @@ class Judge {
       Rules rules = bounds.spec;
       rules.widenUlp = k;
       const UseRules scope(rules);
-      if (std::ranges::all_of(offenders, [&](std::size_t i) { return inside(i); })) return k;
+      std::size_t ambiguous = 0;
+      const bool all =
+          std::ranges::all_of(offenders, [&](std::size_t i) { return inside(i, ambiguous); });
+      // Widening must not excuse at large what it only made undecided.
+      const auto cap = policy["ambiguousCap"] * static_cast<double>(result.bounded);
+      if (all && static_cast<double>(ambiguous) <= cap) return k;
     }
     return 0;
   }
 
   // Offenders are checked in the order of their index, so the first that fails ends it.
-  bool inside(std::size_t i) const {
+  bool inside(std::size_t i, std::size_t& ambiguous) const {
     std::vector<Bounded> allowed(scalars.size());
     expected.bounded(i, allowed);
+    ambiguous += std::ranges::any_of(allowed, &Bounded::ambiguous);
     store(allowed);
     for (std::size_t s = 0; s < scalars.size(); ++s) {
       const double got = twin(i, scalars[s]);

@@ -12,19 +12,22 @@
 namespace gnomon::tonemap {
 namespace {
 
+// Not 1, so that a kernel which passes it on is seen.
+constexpr float kAlpha = 0.25f;
+
 vec4 colour(Random& random, double lo, double hi) {
   const auto component = [&] { return static_cast<float>(random.logUniform(lo, hi)); };
   const float grey = component();
   switch (random.below(3)) {
     case 0:
-      return {grey, grey, grey, 1};
+      return {grey, grey, grey, kAlpha};
     case 1: {
-      vec4 pure(0, 0, 0, 1);
+      vec4 pure(0, 0, 0, kAlpha);
       pure[static_cast<int>(random.below(3))] = grey;
       return pure;
     }
     default:
-      return {grey, component(), component(), 1};
+      return {grey, component(), component(), kAlpha};
   }
 }
 

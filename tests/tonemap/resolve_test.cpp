@@ -82,7 +82,11 @@ TEST_F(TonemapResolve, HighlightsStayInsideTheBound) {
 }
 
 TEST_F(TonemapResolve, BadInputCountsAsTheContractSays) {
-  expectEveryCombinationInsideTheBound(degenerate());
+  Frame frame = degenerate();
+  for (const float exposure : {0x1p-32f, 0.75f, 0x1p32f}) {
+    frame.push.exposure = exposure;
+    expectEveryCombinationInsideTheBound(frame);
+  }
 }
 
 TEST_F(TonemapResolve, BloomOfEverySizeIsFilteredBetweenItsCentres) {
