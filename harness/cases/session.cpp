@@ -102,4 +102,12 @@ CaseRecord& Session::currentCase() {
   return records.back();
 }
 
+const CaseRecord& Session::addFailure(const std::string& caseName, std::string message) {
+  const auto found = std::ranges::find(records, caseName, &CaseRecord::name);
+  if (found == records.end()) throw std::logic_error("no case has run as " + caseName);
+  found->failed = true;
+  found->messages.push_back(std::move(message));
+  return *found;
+}
+
 }  // namespace gnomon

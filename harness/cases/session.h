@@ -72,6 +72,8 @@ class Session {
   void beginCase(std::string name, std::string kernel);
   CaseRecord& currentCase();
   const std::vector<CaseRecord>& cases() const { return records; }
+  /// A case that has ended failed after all, when it ran again elsewhere.
+  const CaseRecord& addFailure(const std::string& caseName, std::string message);
 
  private:
   SpirvWords load(const std::filesystem::path& file, const KernelRecord& record) const;

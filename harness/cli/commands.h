@@ -60,6 +60,9 @@ struct CompareOptions {
 };
 int compare(const CompareOptions& options);
 
+/// Runs cases for a parent process; `task` is its JSON (harness/isolate/messages.h).
+int worker(const std::string& task);
+
 /// Runs ctest in the folder that the command was built in.
 int test(const std::vector<std::string>& arguments);
 

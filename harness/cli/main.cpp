@@ -153,6 +153,14 @@ void addTest(CLI::App& app, Action& action) {
   command->callback([&action, arguments] { action = [arguments] { return test(*arguments); }; });
 }
 
+/// Hidden: what the command starts itself with.
+void addWorker(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("worker", "")->group("");
+  auto task = std::make_shared<std::string>();
+  command->add_option("task", *task)->required();
+  command->callback([&action, task] { action = [task] { return worker(*task); }; });
+}
+
 int complain(const char* what, int status) {
   fmt::print(stderr, "gnomon: {}\n", what);
   return status;
@@ -170,6 +178,7 @@ int run(int argc, char** argv) {
   addBench(app, action);
   addCompare(app, action);
   addTest(app, action);
+  addWorker(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {

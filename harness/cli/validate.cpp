@@ -2,6 +2,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/error.h"
+#include "harness/isolate/sweep.h"
 #include "harness/report/summary.h"
 #include "harness/report/terminal.h"
 
@@ -39,6 +40,18 @@ Observer observerFor(Terminal& terminal, const SessionOptions& options) {
           .end =
               [&terminal, &options](const CaseRecord& record) {
                 if (record.failed) terminal.print(failureText(terminal, record, options));
+              }};
+}
+
+SweepObserver sweepObserver(Terminal& terminal, const SessionOptions& options) {
+  return {.begin =
+              [&terminal](unsigned subgroupSize, std::size_t cases) {
+                terminal.progress(
+                    fmt::format("{} cases again in subgroups of {}", cases, subgroupSize));
+              },
+          .failed =
+              [&terminal, &options](const CaseRecord& record) {
+                terminal.print(failureText(terminal, record, options));
               }};
 }
 
@@ -86,6 +99,7 @@ int validate(const ValidateOptions& given) {
   loadForeignKernels(session);
   session.bounds();  // a file of measured errors that cannot be read is no kernel's fault
   runCases(session, cases, observerFor(terminal, options.session));
+  sweepWidths(session, sweepObserver(terminal, options.session));
 
   const std::vector<KernelSummary> kernels = summarise(session.cases());
   if (!options.out.empty()) writeFindings(options.out, session, gpu);

@@ -47,7 +47,10 @@ Subject::Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::s
                              .roundingModeRte = gpu.info().roundingRteFloat32};
   const SpirvWords twinModule = strictTwin(module, strict);
   twinProgram = gpu.build(description(record, twinModule));
-  if (readsWhatItWrites(reflection) || threadsCommunicate(module))
+  subgroups = std::ranges::any_of(reflection.capabilities, [](const std::string& capability) {
+    return capability.starts_with("GroupNonUniform") || capability.starts_with("Subgroup");
+  });
+  if (readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module))
     turned = gpu.build(description(
         record, gnomon::orderTwin(twinModule, {.subgroupSize = gpu.info().subgroupSize})));
   plainProgram = gpu.build(description(record, std::move(module)));

@@ -22,6 +22,10 @@ class Subject {
   Gpu& gpu() const { return *device; }
   const GpuProgram& plain() const { return plainProgram; }
   const GpuProgram& twin() const { return twinProgram; }
+  /// Threads may see each other's work: by shared memory, atomics, subgroup operations, or storage
+  /// that is both read and written.
+  bool threadsCommunicate() const { return turned.has_value(); }
+  bool usesSubgroups() const { return subgroups; }
   /// The strict twin with the order of groups and subgroups turned round, for a kernel whose
   /// threads communicate; null for any other.
   const GpuProgram* orderTwin() const { return turned ? &*turned : nullptr; }
@@ -33,6 +37,7 @@ class Subject {
   GpuProgram plainProgram;
   GpuProgram twinProgram;
   std::optional<GpuProgram> turned;
+  bool subgroups = false;
 };
 
 }  // namespace gnomon
