@@ -5,8 +5,12 @@
 namespace gnomon {
 
 void KernelCase::SetUp() {
+  skipWhereUnsupported([&] { Session::current().subject(kernelName); });
+}
+
+void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
   try {
-    Session::current().subject(kernelName);
+    attempt();
   } catch (const Unsupported& why) {
     Session::current().currentCase().unsupported = why.what();
     GTEST_SKIP() << why.what();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstring>
+#include <functional>
 #include <span>
 #include <string>
 #include <tuple>
@@ -26,6 +27,9 @@ class KernelCase : public testing::Test {
 
   /// Skips the case as unsupported where the device lacks what the kernel needs.
   void SetUp() override;
+
+  /// The same where only a dispatch tells: the device cannot filter a format, or store to it.
+  void skipWhereUnsupported(const std::function<void()>& attempt);
 
   /// Runs the kernel under every check of hygiene; the findings go to the verdict.
   Observation run(Stimulus stimulus);

@@ -89,6 +89,8 @@ void fillLimits(const VkPhysicalDeviceLimits& limits, GpuInfo& info) {
   info.maxStorageRange = limits.maxStorageBufferRange;
   info.maxImageSide = limits.maxImageDimension2D;
   info.maxImageLayers = limits.maxImageArrayLayers;
+  info.subTexelBits = limits.subTexelPrecisionBits;
+  info.mipmapBits = limits.mipmapPrecisionBits;
 }
 
 GpuInfo describe(const Properties& properties, const FeatureChain& features,

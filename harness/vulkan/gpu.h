@@ -37,6 +37,8 @@ struct GpuInfo {
   std::size_t maxStorageRange = 0;
   unsigned maxImageSide = 0;    ///< pixels, of an image that is no cube
   unsigned maxImageLayers = 0;  ///< a format may allow fewer
+  unsigned subTexelBits = 0;    ///< of the fraction that weights texels, subTexelPrecisionBits
+  unsigned mipmapBits = 0;      ///< of the fraction that weights mip levels, mipmapPrecisionBits
   /// Optional features by the names of the Vulkan structures ("shaderFloat64",
   /// "scalarBlockLayout", "drawIndirectCount"), and "timestamps", "subgroupBasic", "subgroupVote",
   /// "subgroupArithmetic", "subgroupBallot", "subgroupShuffle", "subgroupShuffleRelative",

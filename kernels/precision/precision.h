@@ -1,4 +1,5 @@
-// Contract of stage precision: one built-in of the language at a time, over arrays of arguments.
+// Contract of stage precision: one built-in of the language, or one way of reading or writing an
+// image, at a time, over arrays of arguments.
 #ifndef GNOMON_PRECISION_H
 #define GNOMON_PRECISION_H
 
@@ -17,6 +18,20 @@ struct Result {
 
 struct Measure {  // push constants
   uint count;
+};
+
+struct Place {  // of a sample
+  vec2 uv;      // normalised coordinates, any float
+  float lod;    // explicit, any float
+  float depth;  // that a comparison compares with; else unused
+};
+
+struct Texel {  // read, sampled or to be stored
+  vec4 value;
+};
+
+struct Pixels {  // push constants of load_ and store_: one pixel a thread
+  uvec2 size;    // of the image; buffers hold its pixels in rows, x fastest
 };
 
 // Which operation a pipeline computes: specialisation constant kOperationId. The order is that of
@@ -44,6 +59,10 @@ const uint kFma = 17;
 const uint kArguments = 0;  // binding numbers, set 0
 const uint kResults = 1;
 const uint kGroupSize = 256;
+const uint kImage = 2;      // the image that is read, sampled or written
+const uint kPlaces = 0;     // in the place of arguments
+const uint kTexels = 0;     // likewise, what store_ stores
+const uint kGroupSide = 8;  // of load_ and store_
 
 GNOMON_CONTRACT_END
 

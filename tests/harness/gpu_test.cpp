@@ -481,6 +481,8 @@ TEST(GpuChoice, EveryListedDeviceKnowsItself) {
     EXPECT_FALSE(gpus[i].name.empty());
     EXPECT_GE(gpus[i].subgroupSize, 1u);
     EXPECT_GE(gpus[i].maxGroupInvocations, 128u);  // the specification's minimum
+    EXPECT_GE(gpus[i].subTexelBits, 4u);           // likewise
+    EXPECT_GE(gpus[i].mipmapBits, 4u);             // likewise
     EXPECT_TRUE(gpus[i].features.contains("shaderFloat64"));
     EXPECT_TRUE(gpus[i].features.contains("subgroupArithmetic"));
     EXPECT_FALSE(gpus[i].features.contains("robustBufferAccess"));
