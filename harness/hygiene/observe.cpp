@@ -129,28 +129,35 @@ class Observer {
     }
   }
 
-  /// The order twin against what the strict twin gave.
-  void compareOrder() {
-    if (subject.orderTwin() == nullptr || !subject.record().deterministic) return;
-    resources.upload(kPoison[0]);
-    const std::vector<Bytes> runs = resources.run(*subject.orderTwin(), kPoison[0]);
-    for (std::size_t o = 0; o < runs.size(); ++o) {
-      const Output& out = resources.outputs()[o];
-      const auto turned = elementsIn(out, runs[o]);
-      const Bytes& straight = seen.twin.at(out.name);
-      Difference differing;
-      for (std::size_t i = 0; i < straight.size() / kWord; ++i)
-        if (wordAt(straight, i) != wordAt(turned, i)) differing.note(i);
-      if (differing.words > 0)
-        seen.findings.push_back(fmt::format(
-            "with the order of its groups and of the subgroups in a group turned round, {} of {} "
-            "words of '{}' differ, first {}: a barrier is missing, or its groups race",
-            differing.words, straight.size() / kWord, out.name,
-            where(out, differing.first * kWord)));
-    }
+  /// What communicating threads must not depend on, against what the strict twin gave.
+  void compareArrangements() {
+    if (!subject.threadsCommunicate() || !subject.record().deterministic) return;
+    compare(*subject.orderTwin(),
+            "with the order of its groups and of the subgroups in a group turned round",
+            "a barrier is missing, or its groups race");
+    for (const auto& [size, program] : subject.resizedTwins())
+      compare(program, fmt::format("in subgroups of {}", size),
+              "it depends on the size of a subgroup");
   }
 
  private:
+  void compare(const GpuProgram& program, const std::string& arrangement, const char* why) {
+    resources.upload(kPoison[0]);
+    const std::vector<Bytes> runs = resources.run(program, kPoison[0]);
+    for (std::size_t o = 0; o < runs.size(); ++o) {
+      const Output& out = resources.outputs()[o];
+      const auto other = elementsIn(out, runs[o]);
+      const Bytes& first = seen.twin.at(out.name);
+      Difference differing;
+      for (std::size_t i = 0; i < first.size() / kWord; ++i)
+        if (wordAt(first, i) != wordAt(other, i)) differing.note(i);
+      if (differing.words > 0)
+        seen.findings.push_back(fmt::format("{}, {} of {} words of '{}' differ, first {}: {}",
+                                            arrangement, differing.words, first.size() / kWord,
+                                            out.name, where(out, differing.first * kWord), why));
+    }
+  }
+
   const Subject& subject;
   Resources& resources;
   Observation& seen;
@@ -171,7 +178,7 @@ Observation observe(const Subject& subject, const Stimulus& stimulus) {
     Observer observer(subject, resources, seen);
     observer.watch(subject.plain(), "kernel", seen.plain);
     observer.watch(subject.twin(), "strict twin", seen.twin);
-    observer.compareOrder();
+    observer.compareArrangements();
   }
   if (writesNarrow(subject, stimulus)) {
     Resources resources(subject, stimulus, Target::kContract);

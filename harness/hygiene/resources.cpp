@@ -100,6 +100,8 @@ std::string Output::place(std::size_t element) const {
 
 Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
     : gpu(subject.gpu()), record(subject.record()), stimulus(s) {
+  for (const ImageSpec& i : record.images)
+    if (i.type.starts_with("sampler")) samplers.emplace(i.name, gpu.makeSampler(i.sampler));
   for (const InputBytes& i : s.inputs) addInput(i);
   for (const OutputCount& o : s.outputs) addOutput(o);
   for (const InputImage& i : s.inputImages) addInputImage(i);
@@ -132,9 +134,6 @@ void Resources::addInputImage(const InputImage& input) {
     throw std::logic_error(fmt::format("'{}' has {} bytes of texels, its description {}",
                                        input.image, input.texels.size(), wanted));
   inImages.push_back(gpu.allocateImage(input.description));
-  const ImageSpec& spec = record.image(input.image);
-  samplers.push_back(spec.kind() == BindingSlot::Kind::kCombined ? gpu.makeSampler(spec.sampler)
-                                                                 : GpuSampler());
   traffic += wanted;
 }
 
@@ -168,19 +167,20 @@ void Resources::bind() {
                                 .offset = o.before,
                                 .range = o.dataBytes() + kGuardBytes});
   }
-  const auto bindImage = [&](const ImageSpec& spec, const GpuImage& image,
-                             const GpuSampler* sampler) {
-    dispatch.images.push_back(
-        {.slot = {.set = 0, .binding = spec.binding, .kind = spec.kind()},
-         .image = &image,
-         .sampler = spec.kind() == BindingSlot::Kind::kCombined ? sampler : nullptr,
-         .asArray = spec.type.ends_with("2DArray")});
+  const auto bindImage = [&](const ImageSpec& spec, const GpuImage* image) {
+    const auto sampler = samplers.find(spec.name);
+    dispatch.images.push_back({.slot = {.set = 0, .binding = spec.binding, .kind = spec.kind()},
+                               .image = image,
+                               .sampler = sampler == samplers.end() ? nullptr : &sampler->second,
+                               .asArray = spec.type.ends_with("2DArray")});
   };
   for (std::size_t i = 0; i < inImages.size(); ++i)
-    bindImage(record.image(stimulus.inputImages[i].image), inImages[i], &samplers[i]);
+    bindImage(record.image(stimulus.inputImages[i].image), &inImages[i]);
   std::size_t next = 0;
   for (const Output& o : out)
-    if (o.isImage()) bindImage(record.image(stimulus.outputImages[next++].image), o.image, nullptr);
+    if (o.isImage()) bindImage(record.image(stimulus.outputImages[next++].image), &o.image);
+  for (const ImageSpec& spec : record.images)
+    if (spec.kind() == BindingSlot::Kind::kSampler) bindImage(spec, nullptr);
 }
 
 void Resources::upload(std::uint32_t guard) {

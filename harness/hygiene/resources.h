@@ -1,6 +1,7 @@
 // A stimulus on the device: buffers with guard bands, images, and the dispatch that binds them.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -90,7 +91,7 @@ class Resources {
   std::vector<Input> in;
   std::vector<Output> out;
   std::vector<GpuImage> inImages;
-  std::vector<GpuSampler> samplers;
+  std::map<std::string, GpuSampler> samplers;  ///< by the name of the binding
   Dispatch dispatch;
   std::size_t traffic = 0;
 };

@@ -51,9 +51,22 @@ Subject::Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::s
     return capability.starts_with("GroupNonUniform") || capability.starts_with("Subgroup");
   });
   if (readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module))
-    turned = gpu.build(description(
-        record, gnomon::orderTwin(twinModule, {.subgroupSize = gpu.info().subgroupSize})));
+    buildCommunicationTwins(twinModule);
   plainProgram = gpu.build(description(record, std::move(module)));
+}
+
+void Subject::buildCommunicationTwins(const SpirvWords& twinModule) {
+  const GpuInfo& info = device->info();
+  turned = device->build(
+      description(*contract, gnomon::orderTwin(twinModule, {.subgroupSize = info.subgroupSize})));
+  for (const unsigned size : info.subgroupSizes) {
+    const std::size_t threads =
+        std::size_t{contract->groupSize[0]} * contract->groupSize[1] * contract->groupSize[2];
+    if (size == info.subgroupSize || threads > std::size_t{size} * info.maxGroupSubgroups) continue;
+    ProgramDescription sized = description(*contract, twinModule);
+    sized.subgroupSize = size;
+    resized.emplace(size, device->build(sized));
+  }
 }
 
 }  // namespace gnomon

@@ -1,6 +1,7 @@
 // The kernel under test on one device: its module and its strict twin, ready to run.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -29,14 +30,19 @@ class Subject {
   /// The strict twin with the order of groups and subgroups turned round, for a kernel whose
   /// threads communicate; null for any other.
   const GpuProgram* orderTwin() const { return turned ? &*turned : nullptr; }
+  /// The strict twin of such a kernel at each other subgroup size that the device can make.
+  const std::map<unsigned, GpuProgram>& resizedTwins() const { return resized; }
 
  private:
+  void buildCommunicationTwins(const SpirvWords& twinModule);
+
   Gpu* device;
   const KernelRecord* contract;
   std::string file;
   GpuProgram plainProgram;
   GpuProgram twinProgram;
   std::optional<GpuProgram> turned;
+  std::map<unsigned, GpuProgram> resized;
   bool subgroups = false;
 };
 

@@ -115,6 +115,7 @@ unsigned Struct::scalars() const {
 
 BindingSlot::Kind ImageSpec::kind() const {
   if (type.starts_with("image")) return BindingSlot::Kind::kStorageImage;
+  if (type == "sampler") return BindingSlot::Kind::kSampler;
   if (type.starts_with("sampler")) return BindingSlot::Kind::kCombined;
   return BindingSlot::Kind::kSampledImage;
 }

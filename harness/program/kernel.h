@@ -89,9 +89,10 @@ struct ImageSpec {
   std::string name{};  ///< the GLSL variable
   unsigned binding = 0;
   Access access = Access::kRead;
-  std::string type{};  ///< GLSL spelling: "texture2D", "sampler2DArray", "image2D"
+  /// GLSL spelling: "texture2D", "sampler2DArray", "image2D"; "sampler" is one without an image.
+  std::string type{};
   PixelFormat format = PixelFormat::kRgba8;  ///< of it in a frame
-  SamplerDescription sampler{};              ///< where the type is a sampler
+  SamplerDescription sampler{};              ///< where the type begins with "sampler"
 
   BindingSlot::Kind kind() const;
 };

@@ -19,18 +19,22 @@ struct Properties {
   VkPhysicalDeviceProperties2 core{};
   VkPhysicalDeviceVulkan11Properties v11{};
   VkPhysicalDeviceVulkan12Properties v12{};
+  VkPhysicalDeviceVulkan13Properties v13{};
 };
 
-Properties propertiesOf(VkPhysicalDevice device) {
+Properties propertiesOf(VkPhysicalDevice device, bool has13) {
   Properties properties;
   properties.core.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
   properties.core.pNext = &properties.v11;
   properties.v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES;
   properties.v11.pNext = &properties.v12;
   properties.v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES;
+  properties.v12.pNext = has13 ? &properties.v13 : nullptr;
+  properties.v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES;
   vkGetPhysicalDeviceProperties2(device, &properties.core);
   properties.core.pNext = nullptr;  // the chain points into this function's variable
   properties.v11.pNext = nullptr;
+  properties.v12.pNext = nullptr;
   return properties;
 }
 
@@ -93,6 +97,18 @@ void fillLimits(const VkPhysicalDeviceLimits& limits, GpuInfo& info) {
   info.mipmapBits = limits.mipmapPrecisionBits;
 }
 
+/// Powers of two that a compute shader may ask for; none without subgroupSizeControl.
+std::vector<unsigned> subgroupSizes(const VkPhysicalDeviceVulkan13Properties& properties,
+                                    const FeatureChain& features) {
+  std::vector<unsigned> sizes;
+  if (features.v13.subgroupSizeControl != VK_TRUE ||
+      (properties.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT) == 0)
+    return sizes;
+  for (unsigned s = properties.minSubgroupSize; s != 0 && s <= properties.maxSubgroupSize; s *= 2)
+    sizes.push_back(s);
+  return sizes;
+}
+
 GpuInfo describe(const Properties& properties, const FeatureChain& features,
                  unsigned timestampBits) {
   const VkPhysicalDeviceProperties& core = properties.core.properties;
@@ -105,6 +121,8 @@ GpuInfo describe(const Properties& properties, const FeatureChain& features,
   info.type = typeName(core.deviceType);
   info.software = core.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   info.subgroupSize = properties.v11.subgroupSize;
+  info.subgroupSizes = subgroupSizes(properties.v13, features);
+  info.maxGroupSubgroups = properties.v13.maxComputeWorkgroupSubgroups;
   info.roundingRteFloat32 = canDeclareRte(properties.v12);
   info.signedZeroInfNanFloat32 = properties.v12.shaderSignedZeroInfNanPreserveFloat32 == VK_TRUE;
   info.timestampPeriodNs = timestampBits == 0 ? 0 : core.limits.timestampPeriod;
@@ -160,7 +178,7 @@ std::vector<Adapter> adaptersOf(const Instance& instance) {
     adapter.queueFamily = queue->family;
     adapter.timestampBits = queue->timestampBits;
     adapter.graphics = queue->graphics;
-    const Properties properties = propertiesOf(device);
+    const Properties properties = propertiesOf(device, adapter.has13);
     adapter.limits = properties.core.properties.limits;
     adapter.info = describe(properties, featuresOf(device, adapter.has13), queue->timestampBits);
     adapter.info.index = static_cast<int>(adapters.size());

@@ -25,11 +25,13 @@ struct GpuInfo {
   std::string type{};     ///< "discrete", "integrated", "virtual", "software" or "other"
   bool software = false;  ///< VK_PHYSICAL_DEVICE_TYPE_CPU
   unsigned subgroupSize = 0;
+  std::vector<unsigned> subgroupSizes{};  ///< that a program may ask for; often just one, or none
   /// shaderRoundingModeRTEFloat32, declarable for 32 bit alone (roundingModeIndependence).
   bool roundingRteFloat32 = false;
   bool signedZeroInfNanFloat32 = false;  ///< shaderSignedZeroInfNanPreserveFloat32
   double timestampPeriodNs = 0;          ///< 0: the queue has no timestamps
   unsigned maxGroupInvocations = 0;
+  unsigned maxGroupSubgroups = 0;  ///< of a size that a program has asked for
   std::array<unsigned, 3> maxGroupSize{};
   std::array<unsigned, 3> maxGroupCount{};
   unsigned maxSharedBytes = 0;
@@ -190,6 +192,7 @@ struct ProgramDescription {
   std::vector<BindingSlot> slots{};
   unsigned pushBytes = 0;
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
+  unsigned subgroupSize = 0;  ///< one of GpuInfo::subgroupSizes; 0: the driver's choice
 };
 
 /// As a range: all of the buffer from the offset on.

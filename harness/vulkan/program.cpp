@@ -15,6 +15,11 @@ void requireLimits(const Adapter& adapter, const ProgramDescription& description
   if (description.pushBytes > adapter.limits.maxPushConstantsSize)
     throw Unsupported(fmt::format("{} bytes of push constants; {} has {}", description.pushBytes,
                                   adapter.info.name, adapter.limits.maxPushConstantsSize));
+  const auto& sizes = adapter.info.subgroupSizes;
+  if (description.subgroupSize != 0 &&
+      std::ranges::find(sizes, description.subgroupSize) == sizes.end())
+    throw Unsupported(fmt::format("subgroups of {}; {} cannot make them", description.subgroupSize,
+                                  adapter.info.name));
   for (const BindingSlot& slot : description.slots)
     if (slot.set >= adapter.limits.maxBoundDescriptorSets)
       throw Unsupported(fmt::format("descriptor set {}; {} has {} sets", slot.set,
@@ -107,6 +112,10 @@ OwnedPipeline makePipeline(Device& device, const ProgramDescription& description
   info.stage.module = module.get();
   info.stage.pName = description.entryPoint.c_str();
   info.stage.pSpecializationInfo = &constants;
+  VkPipelineShaderStageRequiredSubgroupSizeCreateInfo size{};
+  size.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO;
+  size.requiredSubgroupSize = description.subgroupSize;
+  if (description.subgroupSize != 0) info.stage.pNext = &size;
   info.layout = layout;
   VkPipeline made = VK_NULL_HANDLE;
   device.check(
