@@ -72,12 +72,8 @@ Ends positions(const Bounded& u, int size, const Sampling& by) {
   if (u.mayBeNan()) return everything;
   const Bounded scaled = u * Bounded(size);
   const Bounded at = by.linear ? scaled - Bounded(0.5f) : scaled;
-  // The last place of a coordinate that was wrapped into [0, 1] before, mirrored into [0, 2].
-  const double wrapped = by.address == AddressMode::clamp    ? 0
-                         : by.address == AddressMode::repeat ? 0x1p-24 * size
-                                                             : 0x1p-23 * size;
-  const double slack =
-      wrapped + (by.linear ? std::ldexp(1.0, -static_cast<int>(by.subTexelBits)) : 0);
+  const double slack = kCoordinateError * size +
+                       (by.linear ? std::ldexp(1.0, -static_cast<int>(by.subTexelBits)) : 0);
   Ends over{at.lo - slack, at.hi + slack};
   if (by.address == AddressMode::clamp) {
     over = {std::clamp(over.lo, -1.0, size + 1.0), std::clamp(over.hi, -1.0, size + 1.0)};
@@ -155,7 +151,7 @@ int interpolations(const TexelImage& image, const Sampling& by) {
 }
 
 // The arithmetic of so many interpolations on top of their weights.
-Bounded rounded(double value, const Filtered& f, Storage storage, int count) {
+Bounded rounded(double value, const Filtered& f, Storage storage, const Sampling& by, int count) {
   const double magnitude = most(std::abs(f.texels.lo), std::abs(f.texels.hi));
   if (count > 0 && !std::isfinite(magnitude)) {
     Bounded any = Bounded::input(std::numeric_limits<float>::quiet_NaN());
@@ -168,10 +164,16 @@ Bounded rounded(double value, const Filtered& f, Storage storage, int count) {
     // reaches twice a texel, two of them again in its product, one last.
     const double room = rules().gamma(5 * count) * magnitude;
     const double steps = isNormalised(storage) ? kCodeError * count / largestCode(storage) : 0;
-    ends = {std::max(ends.lo - steps, f.texels.lo) - room,
-            std::min(ends.hi + steps, f.texels.hi) + room};
+    // 2^count products of weights, each off by half a step; their errors sum to 0, so what counts
+    // of a texel is its distance from the middle of all, at most half of their range.
+    const double products = by.linear ? std::ldexp(f.texels.hi - f.texels.lo,
+                                                   count - 2 - static_cast<int>(by.subTexelBits))
+                                      : 0;
+    ends = {std::max(ends.lo - steps - products, f.texels.lo) - room,
+            std::min(ends.hi + steps + products, f.texels.hi) + room};
   }
   Bounded result = Bounded::between(ends.lo, ends.hi);
+  if (storage == Storage::half && count > 0) result = stored(result, storage);
   result.value = value;
   return result;
 }
@@ -205,7 +207,7 @@ Vec4<Bounded> sampled(const TexelImage& image, const Sampling& by, const Vec2<Bo
       // A NaN's ends are infinite.
       return Ends{t.lo, t.hi};
     };
-    result[c] = rounded(value[c], acrossLevels(texel, image, by, uv, lod), image.storage,
+    result[c] = rounded(value[c], acrossLevels(texel, image, by, uv, lod), image.storage, by,
                         interpolations(image, by));
   }
   return result;

@@ -10,11 +10,17 @@
 // - fractions keep subTexelPrecisionBits and mipmapPrecisionBits bits; nothing is said of the
 //   arithmetic around them; a normalised code c stands for c / (2^b - 1).
 // Device model, where that ends:
-// - coordinates are + and * in float with their roundings, and an address mode may be applied to
-//   the normalised coordinate before them, which keeps an ULP of what lies below 1 (below 2 where
-//   mirrored); llvmpipe does, so the nearest differs next to boundaries;
+// - coordinates are + and * in float with their roundings, and the normalised coordinate is off by
+//   2^-23 before them, whether an address mode was applied to it (llvmpipe) or not (an NVIDIA H200
+//   takes the texel before 4 at 4.0000002, and is off by up to 0.8 of that): the nearest differs
+//   next to boundaries;
 // - weights are off by 2^-subTexelBits, and so are coordinates across a texel's boundary: the hull
 //   over all places that near; an explicit LOD by 2^-mipmapBits, likewise;
+// - products of weights are rounded to subTexelBits, and sum to 1: half a step each. An H200 keeps
+// a
+//   single weight to half a step of 2^-8, yet four texels of different magnitude that nearly cancel
+//   leave what two exact weights explain;
+// - what is filtered of halves may be rounded to a half (an H200 does);
 // - a normalised format may be filtered in its own fixed point, rounded to nearest after each of
 //   up to three linear interpolations (row, column, level): half a code each, but the result stays
 //   between the texels. Llvmpipe does so where it clamps or repeats: among texels 4 codes apart,
@@ -55,6 +61,9 @@ struct TexelImage {
   Storage storage = Storage::float32;
   std::vector<TexelLevel> levels{};  // from the largest on
 };
+
+// Of a normalised coordinate, before it is scaled to texels.
+inline constexpr double kCoordinateError = 0x1p-23;
 
 // Codes by which one linear interpolation of a normalised format may be off.
 inline constexpr double kCodeError = 0.5;
