@@ -14,7 +14,7 @@ void timeKernel(benchmark::State& state, const std::string& kernel, const Stimul
     const Subject& subject = session.subject(kernel);
     if (subject.gpu().info().timestampPeriodNs == 0) throw Unsupported("no GPU timestamps");
     Resources resources(subject, stimulus, Target::kContract);
-    resources.upload(0);
+    resources.upload();
     resources.time(subject.plain());  // pays for what the driver does once
     for (auto _ : state) state.SetIterationTime(resources.time(subject.plain()));
     state.SetItemsProcessed(state.iterations() *

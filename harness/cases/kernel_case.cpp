@@ -1,5 +1,11 @@
 #include "harness/cases/kernel_case.h"
 
+#include <algorithm>
+#include <bit>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "harness/error.h"
 
 namespace gnomon {
@@ -17,11 +23,42 @@ void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
   }
 }
 
+void KernelCase::skipUnlessEveryOutputIsGiven() {
+  if (IsSkipped()) return;
+  const Interface& interface = Session::current().subject(kernelName).interface();
+  if (interface.unmapped.empty()) return;
+  GTEST_SKIP() << fmt::format("the kernel does not give {}", fmt::join(interface.unmapped, ", "));
+}
+
+bool KernelCase::applies(std::span<const std::byte> push) {
+  const Subject& subject = Session::current().subject(kernelName);
+  const bool all = std::ranges::all_of(subject.interface().fixed, [&](const auto& fixed) {
+    const Field& f = *std::ranges::find(subject.record().push.fields, fixed.first, &Field::name);
+    std::uint32_t word = 0;
+    std::memcpy(&word, push.data() + f.offset, sizeof word);
+    const double value = f.scalar == ScalarType::kFloat
+                             ? static_cast<double>(std::bit_cast<float>(word))
+                             : static_cast<double>(word);
+    return value == fixed.second;
+  });
+  if (!all) ++left;
+  return all;
+}
+
+void KernelCase::TearDown() {
+  if (left == 0 || runs > 0 || IsSkipped()) return;
+  std::string only;
+  for (const auto& [name, value] : Session::current().subject(kernelName).interface().fixed)
+    only += fmt::format("{}{} = {}", only.empty() ? "" : ", ", name, value);
+  Session::current().currentCase().skipped = "the kernel stands for " + only + " alone";
+}
+
 Observation KernelCase::run(Stimulus stimulus) {
   Session& session = Session::current();
+  if (!applies(stimulus.push)) return {.applies = false};
+  ++runs;
   stimulus.limit = session.limit();
-  Observation seen = observe(session.subject(kernelName), stimulus);
-  return seen;
+  return observe(session.subject(kernelName), stimulus);
 }
 
 void KernelCase::expectClean(const Observation& seen) {
@@ -40,6 +77,7 @@ void KernelCase::expectWithinSpecification(const Observation& seen, const Expect
 
 void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
                               const Expectation& expected) {
+  if (!seen.applies) return;
   const KernelRecord& contract = Session::current().subject(kernelName).record();
   const Struct layout = contract.layoutOf(expected.output);
   record(bounds, seen, expected, layout);

@@ -31,7 +31,22 @@ class KernelCase : public testing::Test {
   /// The same where only a dispatch tells: the device cannot filter a format, or store to it.
   void skipWhereUnsupported(const std::function<void()>& attempt);
 
-  /// Runs the kernel under every check of hygiene; the findings go to the verdict.
+  /// Skips a case that reads outputs directly where a foreign kernel does not give all of them.
+  void skipUnlessEveryOutputIsGiven();
+
+  /// Whether the kernel takes these push constants: a foreign one may stand for one value of some,
+  /// as its adapter's constants say. A case goes on to the next where it does not.
+  bool applies(std::span<const std::byte> push);
+  template <class Push>
+  bool applies(const Push& push) {
+    return applies(std::as_bytes(std::span(&push, 1)));
+  }
+
+  /// A case in which nothing applied was skipped.
+  void TearDown() override;
+
+  /// Runs the kernel under every check of hygiene; the findings go to the verdict. Where it does
+  /// not apply, nothing runs, and expectConforms says nothing of what is returned.
   Observation run(Stimulus stimulus);
 
   /// For laws, which judge without a verdict: fails the case with what hygiene found.
@@ -52,6 +67,7 @@ class KernelCase : public testing::Test {
 
  private:
   void expectWithin(const Bounds& bounds, const Observation& seen, const Expectation& expected);
+  std::size_t runs = 0, left = 0;  // of run(), and where the kernel did not apply
   void record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
               const Struct& layout);
 };

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "harness/error.h"
-#include "harness/program/compile.h"
 #include "harness/program/embedded.h"
 
 namespace gnomon {
@@ -40,28 +39,17 @@ const Subject& Session::subject(const std::string& kernel) {
   std::unique_ptr<Subject>& slot = subjects[kernel];
   if (!slot) {
     const KernelRecord& record = findKernel(kernel);
-    const auto foreign = settings.kernels.find(kernel);
-    if (foreign == settings.kernels.end()) {
-      const auto words = embeddedSpirv(record.file);
-      slot = std::make_unique<Subject>(on, record, SpirvWords(words.begin(), words.end()),
-                                       "kernels/" + record.file);
-    } else {
-      slot = std::make_unique<Subject>(on, record, load(foreign->second, record),
-                                       foreign->second.string());
-    }
+    slot = std::make_unique<Subject>(on, record, load(record));
   }
   return *slot;
 }
 
-SpirvWords Session::load(const std::filesystem::path& file, const KernelRecord& record) const {
-  if (file.extension() == ".spv") {
-    SpirvWords module = readSpirv(file);
-    if (const std::string why = validateSpirv(module); !why.empty())
-      throw UsageError(file.string() + ": " + why);
-    return module;
-  }
-  const std::filesystem::path kernels = settings.root / "kernels";
-  return compileGlsl(file, {.includeFolders = {kernels / record.stage, kernels}});
+KernelModule Session::load(const KernelRecord& record) const {
+  const auto foreign = settings.kernels.find(record.name());
+  if (foreign != settings.kernels.end())
+    return loadKernel(foreign->second, record, settings.root / "kernels");
+  const auto words = embeddedSpirv(record.file);
+  return {.words = SpirvWords(words.begin(), words.end()), .origin = "kernels/" + record.file};
 }
 
 const Bounds& Session::bounds() {

@@ -76,7 +76,7 @@ class Session {
   const CaseRecord& addFailure(const std::string& caseName, std::string message);
 
  private:
-  SpirvWords load(const std::filesystem::path& file, const KernelRecord& record) const;
+  KernelModule load(const KernelRecord& record) const;
 
   SessionOptions settings;
   Policy choices;

@@ -28,44 +28,8 @@ std::string where(const std::string& place, const Struct& layout, std::size_t by
   return fmt::format("{} + {} bytes", place, offset);
 }
 
-std::string where(const Input& in, std::size_t byte) {
-  const Struct& layout = in.spec->element;
-  return where(fmt::format("{}[{}]", in.spec->name, byte / layout.size), layout, byte);
-}
-
 std::string where(const Output& out, std::size_t byte) {
   return where(out.place(byte / out.layout.size), out.layout, byte);
-}
-
-/// An input is nobody's to write, its guard included: the twin would judge what the module left.
-void checkInput(std::vector<std::string>& findings, const Input& in, const Bytes& now,
-                const std::string& module) {
-  const auto changed = std::ranges::mismatch(in.bytes, now).in1;
-  if (changed != in.bytes.end()) {
-    const auto byte = static_cast<std::size_t>(changed - in.bytes.begin());
-    findings.push_back(fmt::format("the {} wrote into its input, at {}", module, where(in, byte)));
-    return;
-  }
-  for (std::size_t at = (in.bytes.size() + kWord - 1) / kWord; at < now.size() / kWord; ++at)
-    if (wordAt(now, at) != kPoison[0])
-      return findings.push_back(
-          fmt::format("the {} wrote past the end of its input '{}'", module, in.spec->name));
-}
-
-void checkGuards(std::vector<std::string>& findings, const Output& out,
-                 std::span<const std::byte> bytes, std::uint32_t poison,
-                 const std::string& module) {
-  const std::size_t end = out.before + out.dataBytes();
-  for (std::size_t at = 0; at < out.before; at += kWord)
-    if (wordAt(bytes, at / kWord) != poison)
-      return findings.push_back(
-          fmt::format("the {} wrote before the start of '{}': byte {} ahead of it", module,
-                      out.name, out.before - at));
-  for (std::size_t at = end; at + kWord <= bytes.size(); at += kWord)
-    if (wordAt(bytes, at / kWord) != poison)
-      return findings.push_back(
-          fmt::format("the {} wrote past the end of '{}': byte {} after its {} elements", module,
-                      out.name, at - end, out.elements));
 }
 
 /// Words that differ, how many and the first; two results have the same length.
@@ -102,30 +66,25 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
         module, differing.words, out.name, where(out, differing.first * kWord)));
 }
 
-std::span<const std::byte> elementsIn(const Output& out, const Bytes& whole) {
-  return std::span(whole).subspan(out.before, out.dataBytes());
-}
-
 /// Everything that is watched while one subject runs.
 class Observer {
  public:
   Observer(const Subject& s, Resources& r, Observation& o) : subject(s), resources(r), seen(o) {}
 
-  /// Both runs of one module; keeps the elements of the first.
+  /// Both runs of one module; keeps the outputs of the first.
   void watch(const GpuProgram& program, const std::string& module,
              std::map<std::string, Bytes>& outputs) {
-    resources.upload(kPoison[0]);
-    const std::vector<Bytes> runs[2] = {resources.run(program, kPoison[0]),
-                                        resources.run(program, kPoison[1])};
-    for (const Input& in : resources.inputs())
-      checkInput(seen.findings, in, resources.download(in), module);
+    resources.upload();
+    Aftermath first = resources.run(program, kPoison[0]);
+    const Aftermath second = resources.run(program, kPoison[1]);
+    for (const auto& found : {first.strays, resources.changedInputs()})
+      for (const std::string& what : found)
+        seen.findings.push_back(fmt::format("the {} {}", module, what));
     for (std::size_t o = 0; o < resources.outputs().size(); ++o) {
       const Output& out = resources.outputs()[o];
-      checkGuards(seen.findings, out, runs[0][o], kPoison[0], module);
-      const auto data = elementsIn(out, runs[0][o]);
-      checkWords(seen.findings, out, data, elementsIn(out, runs[1][o]),
+      checkWords(seen.findings, out, first.outputs[o], second.outputs[o],
                  subject.record().deterministic, module);
-      outputs.try_emplace(out.name, data.begin(), data.end());
+      outputs.try_emplace(out.name, std::move(first.outputs[o]));
     }
   }
 
@@ -142,15 +101,14 @@ class Observer {
 
  private:
   void compare(const GpuProgram& program, const std::string& arrangement, const char* why) {
-    resources.upload(kPoison[0]);
-    const std::vector<Bytes> runs = resources.run(program, kPoison[0]);
-    for (std::size_t o = 0; o < runs.size(); ++o) {
+    resources.upload();
+    const Aftermath other = resources.run(program, kPoison[0]);
+    for (std::size_t o = 0; o < other.outputs.size(); ++o) {
       const Output& out = resources.outputs()[o];
-      const auto other = elementsIn(out, runs[o]);
       const Bytes& first = seen.twin.at(out.name);
       Difference differing;
       for (std::size_t i = 0; i < first.size() / kWord; ++i)
-        if (wordAt(first, i) != wordAt(other, i)) differing.note(i);
+        if (wordAt(first, i) != wordAt(other.outputs[o], i)) differing.note(i);
       if (differing.words > 0)
         seen.findings.push_back(fmt::format("{}, {} of {} words of '{}' differ, first {}: {}",
                                             arrangement, differing.words, first.size() / kWord,
@@ -173,6 +131,7 @@ bool writesNarrow(const Subject& subject, const Stimulus& stimulus) {
 
 Observation observe(const Subject& subject, const Stimulus& stimulus) {
   Observation seen;
+  seen.unmapped = {subject.interface().unmapped.begin(), subject.interface().unmapped.end()};
   {
     Resources resources(subject, stimulus, Target::kFloat);
     Observer observer(subject, resources, seen);
@@ -193,14 +152,11 @@ Observation observe(const Subject& subject, const Stimulus& stimulus) {
 
 std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus) {
   Resources resources(subject, stimulus, Target::kFloat);
-  resources.upload(kPoison[0]);
-  const std::vector<Bytes> whole = resources.run(subject.twin(), kPoison[0]);
+  resources.upload();
+  Aftermath after = resources.run(subject.twin(), kPoison[0]);
   std::map<std::string, Bytes> outputs;
-  for (std::size_t o = 0; o < whole.size(); ++o) {
-    const Output& out = resources.outputs()[o];
-    const auto data = elementsIn(out, whole[o]);
-    outputs.try_emplace(out.name, data.begin(), data.end());
-  }
+  for (std::size_t o = 0; o < after.outputs.size(); ++o)
+    outputs.try_emplace(resources.outputs()[o].name, std::move(after.outputs[o]));
   return outputs;
 }
 

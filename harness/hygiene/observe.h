@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,10 @@ namespace gnomon {
 /// float image; where its format is narrow, it is there a second time as stored in that format and
 /// read back, under narrowName().
 struct Observation {
+  bool applies = true;  ///< false: a foreign kernel does not stand for this stimulus; nothing ran
   std::map<std::string, Bytes> plain{};  ///< outputs of the module as it is
   std::map<std::string, Bytes> twin{};   ///< outputs of its strict twin
+  std::set<std::string> unmapped{};      ///< "results.F": outputs that the module does not give; 0
   std::vector<std::string> findings{};   ///< hygiene: one sentence each; empty if clean
 };
 

@@ -14,6 +14,9 @@ constexpr std::size_t kGuardBytes = 64 * 1024;
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 
+// A NaN, so that reading past the end of an input poisons a result.
+constexpr std::uint32_t kGuardPattern = 0xffffdeadu;
+
 PixelFormat widened(PixelFormat format) {
   switch (channels(format)) {
     case 1:
@@ -99,33 +102,94 @@ std::string Output::place(std::size_t element) const {
 }
 
 Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
-    : gpu(subject.gpu()), record(subject.record()), stimulus(s) {
+    : gpu(subject.gpu()),
+      record(subject.record()),
+      interface(subject.interface()),
+      conventions(subject.conventions()),
+      stimulus(s),
+      memories(interface.buffers.size()),
+      ownSampler(gpu.makeSampler({.linear = true})) {
   for (const ImageSpec& i : record.images)
     if (i.type.starts_with("sampler")) samplers.emplace(i.name, gpu.makeSampler(i.sampler));
-  for (const InputBytes& i : s.inputs) addInput(i);
-  for (const OutputCount& o : s.outputs) addOutput(o);
+  layOut();
+  packInputs();
+  packParameters();
+  allocate();
   for (const InputImage& i : s.inputImages) addInputImage(i);
   for (const OutputImage& o : s.outputImages) addOutputImage(o, target);
   bind();
-  dispatch.push.assign(s.push.begin(), s.push.end());
-  dispatch.groups = record.grid(s.extent);
+  bindImages();
+  const Grid grid = record.grid ? record.grid : coveringGrid(interface.covered);
+  dispatch.groups = grid(s.extent);
 }
 
-void Resources::addInput(const InputBytes& input) {
-  in.push_back(
-      {&record.buffer(input.buffer), input.bytes, gpu.allocate(input.bytes.size() + kGuardBytes)});
-  traffic += input.bytes.size();
+/// How many elements each of the module's buffers holds, and what the contract's outputs are.
+void Resources::layOut() {
+  for (std::size_t i = 0; i < memories.size(); ++i) memories[i].spec = &interface.buffers[i];
+  const auto hold = [&](const std::string& name, std::size_t elements) {
+    for (const auto& place : interface.placesOf(name))
+      if (place) {
+        std::size_t& held = memories[place->buffer].elements;
+        held = std::max(held, elements);
+      }
+  };
+  for (const InputBytes& i : stimulus.inputs) {
+    hold(i.buffer, i.bytes.size() / record.buffer(i.buffer).element.size);
+    traffic += i.bytes.size();
+  }
+  for (const OutputCount& o : stimulus.outputs) {
+    hold(o.buffer, o.elements);
+    Output output{.name = o.buffer,
+                  .layout = record.buffer(o.buffer).element,
+                  .elements = o.elements,
+                  .given = {}};
+    output.given.assign(output.layout.size / kWord, false);
+    for (const auto& place : interface.placesOf(o.buffer))
+      for (unsigned s = 0; place && s < place->field.scalars; ++s)
+        output.given[place->field.offset / kWord + s] = true;
+    traffic += output.dataBytes();
+    out.push_back(std::move(output));
+  }
+  for (Memory& m : memories) m.size = m.spec->bytes + m.elements * m.spec->stride;
 }
 
-void Resources::addOutput(const OutputCount& output) {
+void Resources::packInputs() {
+  for (const InputBytes& i : stimulus.inputs) {
+    const unsigned size = record.buffer(i.buffer).element.size;
+    for (const auto& place : interface.placesOf(i.buffer)) {
+      if (!place) continue;
+      Memory& m = memories[place->buffer];
+      m.content.resize(m.size);
+      for (std::size_t e = 0; e < i.bytes.size() / size; ++e)
+        pack(*place, i.bytes.subspan(e * size, size),
+             std::span(m.content).subspan(e * m.spec->stride), conventions);
+    }
+  }
+}
+
+/// Push constants and whatever else the module takes once.
+void Resources::packParameters() {
+  dispatch.push.resize(interface.pushBytes);
+  const auto target = [&](unsigned buffer) {
+    if (buffer == Place::kPush) return std::span(dispatch.push);
+    memories[buffer].content.resize(memories[buffer].size);
+    return std::span(memories[buffer].content);
+  };
+  for (const Place& place : interface.push)
+    pack(place, stimulus.push, target(place.buffer), conventions);
+  for (const Preset& preset : interface.presets)
+    std::memcpy(target(preset.buffer).data() + preset.offset, &preset.bits, kWord);
+}
+
+void Resources::allocate() {
   const std::size_t align = std::max<std::size_t>(gpu.offsetAlignment(), kWord);
-  Output o{.name = output.buffer,
-           .layout = record.buffer(output.buffer).element,
-           .elements = output.elements,
-           .before = (kGuardBytes + align - 1) / align * align};
-  o.buffer = gpu.allocate(o.before + o.dataBytes() + kGuardBytes);
-  traffic += o.dataBytes();
-  out.push_back(std::move(o));
+  for (Memory& m : memories) {
+    const bool uniform = m.spec->slot.kind == BindingSlot::Kind::kUniformBuffer;
+    if (m.spec->bytes > 0) m.content.resize(m.size);  // a header starts as 0
+    m.before = m.spec->written ? (kGuardBytes + align - 1) / align * align : 0;
+    m.after = uniform ? 0 : kGuardBytes;
+    m.buffer = gpu.allocate(m.before + m.size + m.after);
+  }
 }
 
 void Resources::addInputImage(const InputImage& input) {
@@ -148,7 +212,10 @@ void Resources::addOutputImage(const OutputImage& output, Target target) {
   Output o{.name = narrow ? narrowName(spec) : spec.name,
            .layout = pixelLayout(spec.format),
            .elements = std::size_t{output.width} * output.height * output.layers,
-           .width = output.width};
+           .width = output.width,
+           .meaning = spec.meaning,
+           .given = {}};
+  o.given.assign(o.layout.size / kWord, true);
   o.image = gpu.allocateImage(description);
   traffic += bytesOf(description);
   out.push_back(std::move(o));
@@ -156,60 +223,79 @@ void Resources::addOutputImage(const OutputImage& output, Target target) {
 
 // Buffers and images move while the lists grow, so the dispatch learns their addresses last.
 void Resources::bind() {
-  for (const Input& i : in)
-    dispatch.buffers.push_back({.slot = {.set = 0, .binding = i.spec->binding},
-                                .buffer = &i.buffer,
-                                .range = i.bytes.size() + kGuardBytes});
-  for (const Output& o : out) {
-    if (o.isImage()) continue;
-    dispatch.buffers.push_back({.slot = {.set = 0, .binding = record.buffer(o.name).binding},
-                                .buffer = &o.buffer,
-                                .offset = o.before,
-                                .range = o.dataBytes() + kGuardBytes});
-  }
-  const auto bindImage = [&](const ImageSpec& spec, const GpuImage* image) {
-    const auto sampler = samplers.find(spec.name);
-    dispatch.images.push_back({.slot = {.set = 0, .binding = spec.binding, .kind = spec.kind()},
-                               .image = image,
-                               .sampler = sampler == samplers.end() ? nullptr : &sampler->second,
-                               .asArray = spec.type.ends_with("2DArray")});
-  };
-  for (std::size_t i = 0; i < inImages.size(); ++i)
-    bindImage(record.image(stimulus.inputImages[i].image), &inImages[i]);
-  std::size_t next = 0;
-  for (const Output& o : out)
-    if (o.isImage()) bindImage(record.image(stimulus.outputImages[next++].image), &o.image);
-  for (const ImageSpec& spec : record.images)
-    if (spec.kind() == BindingSlot::Kind::kSampler) bindImage(spec, nullptr);
+  for (const Memory& m : memories)
+    dispatch.buffers.push_back(
+        {.slot = m.spec->slot, .buffer = &m.buffer, .offset = m.before, .range = m.size + m.after});
 }
 
-void Resources::upload(std::uint32_t guard) {
-  for (const Input& i : in) {
-    gpu.fill(i.buffer, guard);
-    gpu.upload(i.buffer, 0, i.bytes);
+void Resources::bindImages() {
+  std::map<std::string, const GpuImage*> images;
+  for (std::size_t i = 0; i < inImages.size(); ++i)
+    images[stimulus.inputImages[i].image] = &inImages[i];
+  std::size_t next = 0;
+  for (const Output& o : out)
+    if (o.isImage()) images[stimulus.outputImages[next++].image] = &o.image;
+  for (const ModuleImage& i : interface.images) {
+    const bool samples =
+        i.slot.kind == BindingSlot::Kind::kSampler || i.slot.kind == BindingSlot::Kind::kCombined;
+    const auto sampler = samplers.find(i.name);
+    const bool isSampler = i.slot.kind == BindingSlot::Kind::kSampler;
+    dispatch.images.push_back({.slot = i.slot,
+                               .image = isSampler ? nullptr : images.at(i.name),
+                               .sampler = !samples                    ? nullptr
+                                          : sampler == samplers.end() ? &ownSampler
+                                                                      : &sampler->second,
+                               .asArray = i.asArray});
+  }
+}
+
+void Resources::upload() {
+  for (const Memory& m : memories) {
+    if (m.spec->written) continue;
+    gpu.fill(m.buffer, kGuardPattern);
+    gpu.upload(m.buffer, 0, m.content);
   }
   for (std::size_t i = 0; i < inImages.size(); ++i) {
     const InputImage& given = stimulus.inputImages[i];
+    const ImageSpec& spec = record.image(given.image);
     std::size_t at = 0;
     for (unsigned layer = 0; layer < given.description.layers; ++layer)
       for (unsigned mip = 0; mip < given.description.mips; ++mip) {
         const std::size_t bytes = mipBytes(given.description, mip);
-        gpu.uploadImage(inImages[i], layer, mip, given.texels.subspan(at, bytes));
+        const auto [width, height] = mipSize(given.description, mip);
+        const Bytes theirs = inConvention(given.texels.subspan(at, bytes), given.description.format,
+                                          height, spec.meaning, conventions, Way::kIn);
+        gpu.uploadImage(inImages[i], layer, mip, theirs);
         at += bytes;
       }
   }
 }
 
-std::vector<Bytes> Resources::run(const GpuProgram& program, std::uint32_t poison) {
+void Resources::poisonOutputs(std::uint32_t poison) {
+  for (const Memory& m : memories) {
+    if (!m.spec->written) continue;
+    gpu.fill(m.buffer, poison);
+    // A header, or inputs that share the buffer, stand before the elements that are written.
+    if (!m.content.empty()) gpu.upload(m.buffer, m.before, m.content);
+  }
   for (const Output& o : out)
-    if (o.isImage())
-      gpu.fillImage(o.image, repeated(poison));
-    else
-      gpu.fill(o.buffer, poison);
+    if (o.isImage()) gpu.fillImage(o.image, repeated(poison));
+}
+
+Aftermath Resources::run(const GpuProgram& program, std::uint32_t poison) {
+  poisonOutputs(poison);
   time(program);
-  std::vector<Bytes> all;
-  for (const Output& o : out) all.push_back(download(o));
-  return all;
+  Aftermath after;
+  std::vector<Bytes> contents(memories.size());
+  for (std::size_t i = 0; i < memories.size(); ++i) {
+    if (!memories[i].spec->written) continue;
+    contents[i].resize(memories[i].buffer.size());
+    gpu.download(memories[i].buffer, 0, contents[i]);
+    checkGuards(memories[i], contents[i], poison, after.strays);
+  }
+  for (const Output& o : out)
+    after.outputs.push_back(o.isImage() ? downloadImage(o) : unpacked(o, contents));
+  return after;
 }
 
 double Resources::time(const GpuProgram& program) {
@@ -217,24 +303,85 @@ double Resources::time(const GpuProgram& program) {
   return gpu.run({&dispatch, 1}, stimulus.limit).front() * 1e-9;
 }
 
-Bytes Resources::download(const Input& input) const {
-  Bytes now(input.buffer.size());
-  gpu.download(input.buffer, 0, now);
-  return now;
+void Resources::checkGuards(const Memory& m, const Bytes& whole, std::uint32_t poison,
+                            std::vector<std::string>& strays) const {
+  const auto wordAt = [&](std::size_t byte) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, whole.data() + byte, kWord);
+    return word;
+  };
+  for (std::size_t at = 0; at < m.before; at += kWord)
+    if (wordAt(at) != poison)
+      return strays.push_back(fmt::format("wrote before the start of '{}': byte {} ahead of it",
+                                          m.spec->name, m.before - at));
+  const std::size_t end = m.before + m.size;
+  for (std::size_t at = end; at + kWord <= whole.size(); at += kWord)
+    if (wordAt(at) != poison)
+      return strays.push_back(
+          fmt::format("wrote past the end of '{}': byte {} after its {} elements", m.spec->name,
+                      at - end, m.elements));
 }
 
-Bytes Resources::download(const Output& output) const {
-  if (!output.isImage()) {
-    Bytes whole(output.buffer.size());
-    gpu.download(output.buffer, 0, whole);
-    return whole;
+std::string Resources::inputPlace(const Memory& m, std::size_t byte) const {
+  if (m.spec->stride == 0 || byte < m.spec->bytes)
+    return fmt::format("byte {} of '{}'", byte, m.spec->name);
+  const std::size_t element = (byte - m.spec->bytes) / m.spec->stride;
+  const std::size_t start = element * m.spec->stride;
+  for (const auto& [buffer, places] : interface.places)
+    for (const auto& place : places)
+      if (place && &interface.buffers[place->buffer] == m.spec && byte >= start + place->offset &&
+          byte < start + place->offset + place->field.scalars * kWord)
+        return fmt::format("{}[{}].{}", buffer, element, place->field.name);
+  return fmt::format("{}[{}]", m.spec->name, element);
+}
+
+std::vector<std::string> Resources::changedInputs() const {
+  std::vector<std::string> found;
+  for (const Memory& m : memories) {
+    if (m.spec->written) continue;
+    Bytes now(m.buffer.size());
+    gpu.download(m.buffer, 0, now);
+    const auto changed = std::ranges::mismatch(m.content, now).in1;
+    if (changed != m.content.end()) {
+      const auto byte = static_cast<std::size_t>(changed - m.content.begin());
+      found.push_back("wrote into its input, at " + inputPlace(m, byte));
+      continue;
+    }
+    for (std::size_t at = (m.content.size() + kWord - 1) / kWord * kWord; at + kWord <= now.size();
+         at += kWord)
+      if (std::memcmp(now.data() + at, &kGuardPattern, kWord) != 0) {
+        found.push_back(fmt::format("wrote past the end of its input '{}'", m.spec->name));
+        break;
+      }
   }
+  return found;
+}
+
+Bytes Resources::unpacked(const Output& output, const std::vector<Bytes>& contents) const {
+  Bytes elements(output.dataBytes());
+  const unsigned size = output.layout.size;
+  for (const auto& place : interface.placesOf(output.name)) {
+    if (!place) continue;
+    const Memory& m = memories[place->buffer];
+    const auto content = std::span(contents[place->buffer]).subspan(m.before);
+    for (std::size_t e = 0; e < output.elements; ++e)
+      unpack(*place, content.subspan(e * m.spec->stride),
+             std::span(elements).subspan(e * size, size), conventions);
+  }
+  return elements;
+}
+
+Bytes Resources::downloadImage(const Output& output) const {
   const ImageDescription& image = output.image.description();
   const std::size_t layerBytes = mipBytes(image, 0);
   Bytes texels(layerBytes * image.layers);
-  for (unsigned layer = 0; layer < image.layers; ++layer)
-    gpu.downloadImage(output.image, layer, 0,
-                      std::span(texels).subspan(layer * layerBytes, layerBytes));
+  for (unsigned layer = 0; layer < image.layers; ++layer) {
+    const auto rows = std::span(texels).subspan(layer * layerBytes, layerBytes);
+    gpu.downloadImage(output.image, layer, 0, rows);
+    const Bytes ours =
+        inConvention(rows, image.format, image.height, output.meaning, conventions, Way::kOut);
+    std::ranges::copy(ours, rows.begin());
+  }
   return widen(std::move(texels), image.format);
 }
 

@@ -5,13 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "harness/hygiene/pack.h"
 #include "harness/hygiene/stimulus.h"
 #include "harness/hygiene/subject.h"
 #include "reference/bound/storage.h"
 
 namespace gnomon {
-
-using Bytes = std::vector<std::byte>;
 
 /// What output images are made of.
 enum class Target {
@@ -29,16 +28,15 @@ Storage storageOf(PixelFormat format);
 /// "target as RGBA8".
 std::string narrowName(const ImageSpec& image);
 
-/// One output. Downloaded it is 32-bit scalars in the order of its layout; a buffer brings a guard
-/// band before and behind its elements along.
+/// One output of the contract: 32-bit scalars in the order of its layout.
 struct Output {
   std::string name{};
   Struct layout{};
   std::size_t elements = 0;
-  unsigned width = 0;      ///< pixels in a row; 0: a buffer
-  std::size_t before = 0;  ///< bytes of the leading guard, aligned for binding
-  GpuBuffer buffer{};
+  unsigned width = 0;  ///< pixels in a row; 0: a buffer
   GpuImage image{};
+  std::string meaning{};      ///< as ImageSpec's
+  std::vector<bool> given{};  ///< by word of an element: whether the module gives it at all
 
   bool isImage() const { return width > 0; }
   std::size_t dataBytes() const { return elements * layout.size; }
@@ -48,11 +46,10 @@ struct Output {
   std::string place(std::size_t element) const;
 };
 
-/// One input buffer: its bytes, then a guard band.
-struct Input {
-  const BufferSpec* spec = nullptr;
-  std::span<const std::byte> bytes{};
-  GpuBuffer buffer{};
+/// What one run left behind.
+struct Aftermath {
+  std::vector<Bytes> outputs{};       ///< as Resources::outputs(); what is not given is 0
+  std::vector<std::string> strays{};  ///< "wrote past the end of 'results': byte 0 after its ..."
 };
 
 class Resources {
@@ -61,37 +58,57 @@ class Resources {
   /// an input image does not have the bytes that its description asks for.
   Resources(const Subject& subject, const Stimulus& stimulus, Target target);
 
-  /// Inputs as the stimulus has them, each followed by a guard band of this pattern.
-  void upload(std::uint32_t guard);
+  /// Inputs as the stimulus has them, each followed by a guard band of NaN.
+  void upload();
 
-  /// Fills every output, guards included, with the pattern and runs the program once. Returns the
-  /// outputs, guards included, in the order of outputs().
-  std::vector<Bytes> run(const GpuProgram& program, std::uint32_t poison);
+  /// Fills every output, guards included, with the pattern and runs the program once.
+  Aftermath run(const GpuProgram& program, std::uint32_t poison);
+
+  /// Inputs that are no longer what was uploaded: "wrote into its input, at samples[3].normal".
+  std::vector<std::string> changedInputs() const;
 
   /// Seconds on the device that one run takes, outputs left as they are.
   double time(const GpuProgram& program);
 
-  const std::vector<Input>& inputs() const { return in; }
   const std::vector<Output>& outputs() const { return out; }
-  Bytes download(const Input& input) const;
   /// Of all that the contract names, each once: the least that has to move.
   std::size_t bytes() const { return traffic; }
 
  private:
-  void addInput(const InputBytes& input);
-  void addOutput(const OutputCount& output);
+  /// One of the module's buffers: guard, content, guard.
+  struct Memory {
+    const ModuleBuffer* spec = nullptr;
+    std::size_t elements = 0;
+    Bytes content{};  ///< what a run starts from; empty where that is all poison
+    std::size_t size = 0, before = 0, after = 0;
+    GpuBuffer buffer{};
+  };
+
+  void layOut();
+  void packInputs();
+  void packParameters();
+  void allocate();
   void addInputImage(const InputImage& input);
   void addOutputImage(const OutputImage& output, Target target);
   void bind();
-  Bytes download(const Output& output) const;
+  void bindImages();
+  void poisonOutputs(std::uint32_t poison);
+  void checkGuards(const Memory& memory, const Bytes& whole, std::uint32_t poison,
+                   std::vector<std::string>& strays) const;
+  Bytes unpacked(const Output& output, const std::vector<Bytes>& memories) const;
+  Bytes downloadImage(const Output& output) const;
+  std::string inputPlace(const Memory& memory, std::size_t byte) const;
 
   Gpu& gpu;
   const KernelRecord& record;
+  const Interface& interface;
+  const Conventions& conventions;
   const Stimulus& stimulus;
-  std::vector<Input> in;
+  std::vector<Memory> memories;  ///< as Interface::buffers
   std::vector<Output> out;
   std::vector<GpuImage> inImages;
-  std::map<std::string, GpuSampler> samplers;  ///< by the name of the binding
+  std::map<std::string, GpuSampler> samplers;  ///< by the contract's name
+  GpuSampler ownSampler;                       ///< of a module that brings one
   Dispatch dispatch;
   std::size_t traffic = 0;
 };

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "harness/error.h"
 #include "harness/program/order.h"
 #include "harness/program/reflect.h"
@@ -12,58 +9,55 @@
 namespace gnomon {
 namespace {
 
-void refuseWhatContradicts(const KernelRecord& record, const Reflection& reflection,
-                           const std::string& origin) {
-  const std::vector<std::string> lines = contradictions(record, reflection);
-  if (!lines.empty())
-    throw UsageError(fmt::format("{} does not fit the contract of {}:\n  {}", origin, record.name(),
-                                 fmt::join(lines, "\n  ")));
-}
-
 bool readsWhatItWrites(const Reflection& reflection) {
   return std::ranges::any_of(reflection.bindings, [](const ReflectedBinding& b) {
     return b.kind.starts_with("storage") && !b.readOnly && !b.writeOnly;
   });
 }
 
-ProgramDescription description(const KernelRecord& record, SpirvWords module) {
-  ProgramDescription d{.spirv = std::move(module)};
-  for (const BufferSpec& b : record.buffers) d.slots.push_back({.set = 0, .binding = b.binding});
-  for (const ImageSpec& i : record.images)
-    d.slots.push_back({.set = 0, .binding = i.binding, .kind = i.kind()});
-  d.pushBytes = record.push.size;
-  d.specialization = record.specialization;
-  return d;
+bool asksForSubgroups(const Reflection& reflection) {
+  return std::ranges::any_of(reflection.capabilities, [](const std::string& capability) {
+    return capability.starts_with("GroupNonUniform") || capability.starts_with("Subgroup");
+  });
 }
 
 }  // namespace
 
-Subject::Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::string origin)
-    : device(&gpu), contract(&record), file(std::move(origin)) {
+Subject::Subject(Gpu& gpu, const KernelRecord& record, KernelModule module)
+    : device(&gpu), contract(&record), file(std::move(module.origin)) {
   if (const auto why = gpu.info().lacks(record.features)) throw Unsupported(*why);
-  const Reflection reflection = reflect(module);
-  refuseWhatContradicts(record, reflection, file);
+  const Reflection reflection = reflect(module.words, module.entryPoint);
+  const Adapter* adapter = module.adapter ? &*module.adapter : nullptr;
+  mapping = interfaceOf(record, reflection, adapter, file);
+  if (adapter != nullptr) manners = adapter->conventions;
+  subgroups = asksForSubgroups(reflection);
   const StrictOptions strict{.signedZeroInfNanPreserve = gpu.info().signedZeroInfNanFloat32,
                              .roundingModeRte = gpu.info().roundingRteFloat32};
-  const SpirvWords twinModule = strictTwin(module, strict);
-  twinProgram = gpu.build(description(record, twinModule));
-  subgroups = std::ranges::any_of(reflection.capabilities, [](const std::string& capability) {
-    return capability.starts_with("GroupNonUniform") || capability.starts_with("Subgroup");
-  });
-  if (readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module))
+  const SpirvWords twinModule = strictTwin(module.words, strict);
+  twinProgram = gpu.build(description(twinModule));
+  if (readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module.words))
     buildCommunicationTwins(twinModule);
-  plainProgram = gpu.build(description(record, std::move(module)));
+  plainProgram = gpu.build(description(std::move(module.words)));
+}
+
+ProgramDescription Subject::description(SpirvWords module) const {
+  ProgramDescription d{.spirv = std::move(module), .entryPoint = mapping.entryPoint};
+  for (const ModuleBuffer& b : mapping.buffers) d.slots.push_back(b.slot);
+  for (const ModuleImage& i : mapping.images) d.slots.push_back(i.slot);
+  d.pushBytes = mapping.pushBytes;
+  d.specialization = mapping.specialization;
+  return d;
 }
 
 void Subject::buildCommunicationTwins(const SpirvWords& twinModule) {
   const GpuInfo& info = device->info();
   turned = device->build(
-      description(*contract, gnomon::orderTwin(twinModule, {.subgroupSize = info.subgroupSize})));
+      description(gnomon::orderTwin(twinModule, {.subgroupSize = info.subgroupSize})));
+  const auto& group = mapping.groupSize;
+  const std::size_t threads = std::size_t{group[0]} * group[1] * group[2];
   for (const unsigned size : info.subgroupSizes) {
-    const std::size_t threads =
-        std::size_t{contract->groupSize[0]} * contract->groupSize[1] * contract->groupSize[2];
     if (size == info.subgroupSize || threads > std::size_t{size} * info.maxGroupSubgroups) continue;
-    ProgramDescription sized = description(*contract, twinModule);
+    ProgramDescription sized = description(twinModule);
     sized.subgroupSize = size;
     resized.emplace(size, device->build(sized));
   }

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "harness/program/kernel.h"
-#include "harness/program/spirv.h"
+#include "harness/program/foreign.h"
+#include "harness/program/interface.h"
 #include "harness/vulkan/gpu.h"
 
 namespace gnomon {
@@ -15,12 +15,13 @@ namespace gnomon {
 /// contradicts the record, Unsupported where the device lacks what the kernel needs.
 class Subject {
  public:
-  /// `origin` names the module for messages: "kernels/brdf/evaluate.comp" or a user's file.
-  Subject(Gpu& gpu, const KernelRecord& record, SpirvWords module, std::string origin);
+  Subject(Gpu& gpu, const KernelRecord& record, KernelModule module);
 
   const KernelRecord& record() const { return *contract; }
   const std::string& origin() const { return file; }
   Gpu& gpu() const { return *device; }
+  const Interface& interface() const { return mapping; }
+  const std::map<std::string, std::string>& conventions() const { return manners; }
   const GpuProgram& plain() const { return plainProgram; }
   const GpuProgram& twin() const { return twinProgram; }
   /// Threads may see each other's work: by shared memory, atomics, subgroup operations, or storage
@@ -34,11 +35,14 @@ class Subject {
   const std::map<unsigned, GpuProgram>& resizedTwins() const { return resized; }
 
  private:
+  ProgramDescription description(SpirvWords module) const;
   void buildCommunicationTwins(const SpirvWords& twinModule);
 
   Gpu* device;
   const KernelRecord* contract;
   std::string file;
+  Interface mapping;
+  std::map<std::string, std::string> manners;
   GpuProgram plainProgram;
   GpuProgram twinProgram;
   std::optional<GpuProgram> turned;

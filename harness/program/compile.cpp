@@ -89,13 +89,13 @@ class Includer final : public glslang::TShader::Includer {
   std::size_t bytes = 0;
 };
 
-EShLanguage stageOf(const fs::path& file) {
-  const std::string ending = file.extension().string();
+EShLanguage stageOf(const fs::path& file, const std::string& stage) {
+  const std::string ending = stage.empty() ? file.extension().string() : stage;
   if (ending == ".comp") return EShLangCompute;
   if (ending == ".vert") return EShLangVertex;
   if (ending == ".frag") return EShLangFragment;
-  throw UsageError(
-      fmt::format("{}: the ending must say the stage: .comp, .vert or .frag", file.string()));
+  throw UsageError(fmt::format("{}: the ending must say what it is: .comp, .hlsl, .spv or .json",
+                               file.string()));
 }
 
 std::string readShader(const fs::path& file) {
@@ -144,11 +144,12 @@ void prepare(glslang::TShader& shader, EShLanguage stage, const std::string& pre
   shader.setPreamble(preamble.c_str());
   for (const auto& [name, value] : options.defines)
     shader.addProcesses({fmt::format("define-macro {}={}", name, value)});
-  if (options.entryPoint != "main") {
+  if (options.hlsl || options.entryPoint != "main") {
     shader.setEntryPoint(options.entryPoint.c_str());
-    shader.setSourceEntryPoint("main");
+    shader.setSourceEntryPoint(options.hlsl ? options.entryPoint.c_str() : "main");
   }
-  shader.setEnvInput(glslang::EShSourceGlsl, stage, glslang::EShClientVulkan, 100);
+  shader.setEnvInput(options.hlsl ? glslang::EShSourceHlsl : glslang::EShSourceGlsl, stage,
+                     glslang::EShClientVulkan, 100);
   shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_2);
   shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_5);
   // Not setDebugInfo(): that is for NonSemantic.Shader.DebugInfo, and without its instruction set
@@ -170,10 +171,11 @@ SpirvWords generate(const glslang::TIntermediate& program) {
   return words;
 }
 
-SpirvWords compileText(const fs::path& file, EShLanguage stage, const std::string& text,
-                       const CompileOptions& options) {
-  constexpr auto kMessages =
-      static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules | EShMsgDebugInfo);
+SpirvWords compile(const fs::path& file, EShLanguage stage, const std::string& text,
+                   const CompileOptions& options) {
+  const auto messages =
+      static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules | EShMsgDebugInfo |
+                               (options.hlsl ? EShMsgReadHlsl | EShMsgHlslOffsets : 0));
   constexpr int kVersionWithoutDirective = 100;  // glslangValidator's
   const std::string name = file.string();
   const std::string preamble = preambleOf(options);
@@ -185,25 +187,31 @@ SpirvWords compileText(const fs::path& file, EShLanguage stage, const std::strin
   glslang::TShader shader(stage);
   shader.setStringsWithLengthsAndNames(texts, lengths, names, 1);
   prepare(shader, stage, preamble, options);
-  if (!shader.parse(GetDefaultResources(), kVersionWithoutDirective, false, kMessages, includer))
+  if (!shader.parse(GetDefaultResources(), kVersionWithoutDirective, false, messages, includer))
     throw UsageError(firstErrors(shader.getInfoLog(), file));
   glslang::TProgram program;
   program.addShader(&shader);
-  if (!program.link(kMessages) || !program.mapIO())
+  if (!program.link(messages) || !program.mapIO())
     throw UsageError(firstErrors(program.getInfoLog(), file));
   return generate(*program.getIntermediate(stage));
 }
 
 }  // namespace
 
-std::vector<std::uint32_t> compileGlsl(const fs::path& file, const CompileOptions& options) {
+std::vector<std::uint32_t> compileText(const fs::path& file, const std::string& text,
+                                       const CompileOptions& options) {
   static std::once_flag initialized;
   std::call_once(initialized, glslang::InitializeProcess);
-  const EShLanguage stage = stageOf(file);
-  SpirvWords words = compileText(file, stage, readShader(file), options);
+  SpirvWords words = compile(file, stageOf(file, options.stage), text, options);
+  if (options.hlsl) words = legalized(words);
   if (const std::string complaint = validateSpirv(words); !complaint.empty())
     throw UsageError(fmt::format("{}: compiles to invalid SPIR-V: {}", file.string(), complaint));
   return words;
+}
+
+std::vector<std::uint32_t> compileShader(const fs::path& file, const CompileOptions& options) {
+  stageOf(file, options.stage);  // before a file that may not be text is read
+  return compileText(file, readShader(file), options);
 }
 
 }  // namespace gnomon

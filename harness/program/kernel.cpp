@@ -30,81 +30,6 @@ Field typed(const char* type, ScalarType scalar, unsigned scalars) {
   return {.name = {}, .type = type, .scalar = scalar, .scalars = scalars};
 }
 
-// Members of a struct against those that the shader declares, position by position.
-void compareMembers(std::vector<std::string>& lines, const std::string& where, const Struct& ours,
-                    const std::vector<ReflectedMember>& theirs) {
-  for (const Field& f : ours.fields) {
-    const auto found = std::ranges::find(theirs, f.name, &ReflectedMember::path);
-    if (found == theirs.end()) {
-      lines.push_back(
-          fmt::format("{} has no member '{}' in the shader; the contract has {} {} at "
-                      "byte {}",
-                      where, f.name, f.type, f.name, f.offset));
-    } else if (found->type != f.type) {
-      lines.push_back(fmt::format("{}.{} is {} in the shader, {} in the contract", where, f.name,
-                                  found->type, f.type));
-    } else if (found->offset != f.offset) {
-      lines.push_back(fmt::format("{}.{} is at byte {} in the shader, {} in the contract", where,
-                                  f.name, found->offset, f.offset));
-    }
-  }
-  for (const ReflectedMember& m : theirs)
-    if (std::ranges::find(ours.fields, m.path, &Field::name) == ours.fields.end())
-      lines.push_back(fmt::format("{}.{} ({}) stands in the shader but not in the contract", where,
-                                  m.path, m.type));
-}
-
-// The binding of that name, if it stands where the contract has it.
-const ReflectedBinding* compareBinding(std::vector<std::string>& lines, const char* what,
-                                       const std::string& name, unsigned binding,
-                                       const Reflection& reflection) {
-  const auto found = std::ranges::find(reflection.bindings, name, &ReflectedBinding::name);
-  if (found == reflection.bindings.end()) {
-    lines.push_back(
-        fmt::format("the shader has no {} '{}', which the contract binds at set 0, binding {}",
-                    what, name, binding));
-    return nullptr;
-  }
-  if (found->set != 0 || found->binding != binding)
-    lines.push_back(fmt::format(
-        "'{}' is at set {}, binding {} in the shader, set 0, binding {} in the contract", name,
-        found->set, found->binding, binding));
-  return &*found;
-}
-
-void compareBuffer(std::vector<std::string>& lines, const BufferSpec& ours,
-                   const Reflection& reflection) {
-  const ReflectedBinding* theirs =
-      compareBinding(lines, "buffer", ours.name, ours.binding, reflection);
-  if (theirs == nullptr) return;
-  if (theirs->kind != "storage buffer") {
-    lines.push_back(fmt::format("'{}' is a {} in the shader, a storage buffer in the contract",
-                                ours.name, theirs->kind));
-    return;
-  }
-  if (theirs->stride != ours.element.size)
-    lines.push_back(
-        fmt::format("an element of '{}' takes {} bytes in the shader, {} in the contract",
-                    ours.name, theirs->stride, ours.element.size));
-  compareMembers(lines, ours.name, ours.element, theirs->members);
-}
-
-void compareImage(std::vector<std::string>& lines, const ImageSpec& ours,
-                  const Reflection& reflection) {
-  const ReflectedBinding* theirs =
-      compareBinding(lines, "image", ours.name, ours.binding, reflection);
-  if (theirs == nullptr) return;
-  if (theirs->type != ours.type)
-    lines.push_back(fmt::format("'{}' is {} in the shader, {} in the contract", ours.name,
-                                theirs->type.empty() ? "a " + theirs->kind : theirs->type,
-                                ours.type));
-}
-
-bool bindsNothingOf(const KernelRecord& record, const std::string& name) {
-  return std::ranges::find(record.buffers, name, &BufferSpec::name) == record.buffers.end() &&
-         std::ranges::find(record.images, name, &ImageSpec::name) == record.images.end();
-}
-
 }  // namespace
 
 unsigned Struct::scalars() const {
@@ -178,26 +103,6 @@ const KernelRecord& findKernel(std::string_view name) {
   }
   throw UsageError(
       fmt::format("there is no kernel '{}'.\nKernels: {}", name, fmt::join(names, ", ")));
-}
-
-std::vector<std::string> contradictions(const KernelRecord& record, const Reflection& reflection) {
-  std::vector<std::string> lines;
-  for (const BufferSpec& b : record.buffers) compareBuffer(lines, b, reflection);
-  for (const ImageSpec& i : record.images) compareImage(lines, i, reflection);
-  for (const ReflectedBinding& b : reflection.bindings)
-    if (bindsNothingOf(record, b.name))
-      lines.push_back(
-          fmt::format("the shader binds {} '{}' (set {}, binding {}), which the contract "
-                      "does not know",
-                      b.kind, b.name, b.set, b.binding));
-  if (reflection.groupSize != record.groupSize)
-    lines.push_back(fmt::format("a group is {} threads in the shader, {} in the contract",
-                                fmt::join(reflection.groupSize, " x "),
-                                fmt::join(record.groupSize, " x ")));
-  if (reflection.pushBytes != record.push.size)
-    lines.push_back(fmt::format("push constants take {} bytes in the shader, {} in the contract",
-                                reflection.pushBytes, record.push.size));
-  return lines;
 }
 
 template <>

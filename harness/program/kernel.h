@@ -13,7 +13,6 @@
 #include <type_traits>
 #include <vector>
 
-#include "harness/program/reflect.h"
 #include "harness/vulkan/gpu.h"
 #include "kernels/contract.h"
 
@@ -29,6 +28,7 @@ struct Field {
   unsigned offset = 0;      ///< bytes
   unsigned scalars = 0;     ///< number of 32-bit scalars
   bool signOfZero = false;  ///< the contract fixes the sign of a zero
+  std::string meaning{};    ///< what a convention may change: "roughness", "depth"
 };
 
 /// A contract struct, described once so that reflection can be held against it.
@@ -47,11 +47,18 @@ struct FieldOf {
   std::string name{};
   M S::*member;
   bool signOfZero = false;
+  std::string meaning{};
 };
 
 template <class S, class M>
 FieldOf<S, M> field(std::string name, M S::*member) {
   return {std::move(name), member};
+}
+
+/// A field that means something which kernels express in several ways (Field::meaning).
+template <class S, class M>
+FieldOf<S, M> field(std::string name, M S::*member, std::string meaning) {
+  return {std::move(name), member, false, std::move(meaning)};
 }
 
 /// The GLSL spelling and scalar type of a member: float, uint, int, vectors and matrices of them.
@@ -66,6 +73,7 @@ Struct describe(std::string name, FieldOf<S, M>... members) {
     Field f = typeOfMember<std::remove_cvref_t<decltype(object.*m.member)>>();
     f.name = m.name;
     f.signOfZero = m.signOfZero;
+    f.meaning = m.meaning;
     f.offset = static_cast<unsigned>(reinterpret_cast<const std::byte*>(&(object.*m.member)) -
                                      reinterpret_cast<const std::byte*>(&object));
     result.fields.push_back(std::move(f));
@@ -93,6 +101,7 @@ struct ImageSpec {
   std::string type{};
   PixelFormat format = PixelFormat::kRgba8;  ///< of it in a frame
   SamplerDescription sampler{};              ///< where the type begins with "sampler"
+  std::string meaning{};                     ///< as Field::meaning
 
   BindingSlot::Kind kind() const;
 };
@@ -108,6 +117,19 @@ struct Extent {
 
 using Grid = std::function<std::array<std::uint32_t, 3>(const Extent&)>;
 
+/// An expression that an adapter's `functions` may give.
+struct FunctionSlot {
+  std::string name{};    ///< "D"; the entry calls it as GNOMON_D
+  std::string output{};  ///< "results.D", which the kernel does not give without it; or
+  std::string push{};  ///< "curve", which stays 0 without it and is the adapter's constant with it
+};
+
+/// How somebody's functions are called: an entry point of ours around expressions of theirs.
+struct FunctionEntry {
+  std::string file{};  ///< under kernels/; without one there are no functions to give
+  std::vector<FunctionSlot> slots{};
+};
+
 /// One entry of a stage: everything a run of it needs to know.
 struct KernelRecord {
   int order = 0;        ///< of the stage, as a frame runs them (README's stage table)
@@ -117,12 +139,14 @@ struct KernelRecord {
   std::vector<BufferSpec> buffers{};
   std::vector<ImageSpec> images{};
   Struct push;
-  std::array<unsigned, 3> groupSize{1, 1, 1};
-  Grid grid;
+  Grid grid{};                          ///< where it is not as many groups as cover the extent
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
   bool deterministic = true;  ///< two runs on the same input agree to the bit
-  std::string summary{};      ///< one line for `gnomon list kernels`
+  /// What a foreign kernel may express otherwise: convention -> values, ours first.
+  std::map<std::string, std::vector<std::string>> conventions{};
+  FunctionEntry functions{};
+  std::string summary{};  ///< one line for `gnomon list kernels`
 
   std::string name() const { return stage + "/" + entry; }
   const BufferSpec& buffer(std::string_view called) const;
@@ -143,10 +167,6 @@ std::vector<const KernelRecord*> catalogue();
 
 /// The record called "stage/entry"; throws UsageError that lists what there is.
 const KernelRecord& findKernel(std::string_view name);
-
-/// Where a module's interface contradicts the record, one line each with both sides named
-/// ("results.F is at byte 16 in the shader, 8 in the contract"); empty if they agree.
-std::vector<std::string> contradictions(const KernelRecord& record, const Reflection& reflection);
 
 template <>
 Field typeOfMember<float>();

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <spirv-tools/libspirv.h>
 #include <spirv-tools/libspirv.hpp>
+#include <spirv-tools/optimizer.hpp>
 #include <spirv_cross/spirv.hpp>
 
 #include "harness/error.h"
@@ -345,6 +346,59 @@ SpirvWords strictTwin(std::span<const std::uint32_t> module, const StrictOptions
     twin.insert(twin.end(), words.begin(), words.end());
   }
   return twin;
+}
+
+namespace {
+
+template <class Register>
+SpirvWords optimized(std::span<const std::uint32_t> module, const Register& passes) {
+  spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_2);
+  FirstMessage message;
+  optimizer.SetMessageConsumer(message.consumer());
+  passes(optimizer);
+  spvtools::OptimizerOptions options;
+  options.set_run_validator(false);  // the caller validates, with scalar block layout
+  SpirvWords words;
+  if (!optimizer.Run(module.data(), module.size(), &words, options))
+    throw UsageError("SPIRV-Tools: " + message.text);
+  return words;
+}
+
+}  // namespace
+
+SpirvWords legalized(std::span<const std::uint32_t> module) {
+  return optimized(module, [](spvtools::Optimizer& o) { o.RegisterLegalizationPasses(); });
+}
+
+SpirvWords withoutImageFormats(std::span<const std::uint32_t> module) {
+  constexpr std::size_t kSampled = 7, kFormat = 8;
+  constexpr std::uint32_t kStorage = 2;
+  SpirvModule parsed = parseSpirv(module);
+  bool changed = false, reads = false;
+  for (const SpirvInstruction& i : parsed.instructions) {
+    reads |= i.opcode == spv::OpImageRead;
+    if (i.opcode != spv::OpTypeImage || parsed.words[i.offset + kSampled] != kStorage) continue;
+    std::uint32_t& format = parsed.words[i.offset + kFormat];
+    // Atomics on an image need its format.
+    if (format == spv::ImageFormatUnknown || format == spv::ImageFormatR32ui ||
+        format == spv::ImageFormatR32i)
+      continue;
+    format = spv::ImageFormatUnknown;
+    changed = true;
+  }
+  if (!changed) return std::move(parsed.words);
+  SpirvWords capabilities;
+  appendInstruction(capabilities, spv::OpCapability,
+                    {spv::CapabilityStorageImageWriteWithoutFormat});
+  if (reads)
+    appendInstruction(capabilities, spv::OpCapability,
+                      {spv::CapabilityStorageImageReadWithoutFormat});
+  parsed.words.insert(parsed.words.begin() + kSpirvHeaderWords, capabilities.begin(),
+                      capabilities.end());
+  // Types that differed in their formats are the same now, and may stand only once.
+  return optimized(parsed.words, [](spvtools::Optimizer& o) {
+    o.RegisterPass(spvtools::CreateRemoveDuplicatesPass());
+  });
 }
 
 }  // namespace gnomon

@@ -66,4 +66,12 @@ struct StrictOptions {
 /// not parse; the twin of a valid module is valid.
 SpirvWords strictTwin(std::span<const std::uint32_t> module, const StrictOptions& options);
 
+/// What a front end leaves to be done after HLSL: SPIRV-Tools' legalisation passes. Throws
+/// UsageError where they refuse.
+SpirvWords legalized(std::span<const std::uint32_t> module);
+
+/// The same module with storage images of no format, so that they can be bound to images of any: a
+/// writer's arithmetic is judged in 32-bit floats before a narrow format rounds it.
+SpirvWords withoutImageFormats(std::span<const std::uint32_t> module);
+
 }  // namespace gnomon

@@ -22,6 +22,7 @@ struct Scalar {
   unsigned offset;
   ScalarType type;
   bool signOfZero;
+  bool given = true;  // false: a foreign kernel does not give it, and reads as 0
 };
 
 std::vector<Scalar> scalarsOf(const Struct& layout) {
@@ -100,6 +101,8 @@ class Judge {
     result.fields.resize(structure.fields.size());
     for (std::size_t f = 0; f < structure.fields.size(); ++f)
       result.fields[f].name = structure.fields[f].name;
+    for (Scalar& one : scalars)
+      one.given = !seen.unmapped.contains(e.output + "." + structure.fields[one.field].name);
     widths.resize(scalars.size());
   }
 
@@ -164,6 +167,8 @@ class Judge {
       for (std::size_t i = begin; i < end; ++i) {
         if (judged[i]) continue;
         expected.plain(i, values);
+        for (std::size_t s = 0; s < scalars.size(); ++s)
+          if (!scalars[s].given) values[s] = 0;
         if (!clears(i, values, slack)) mine.push_back(i);
       }
       const std::lock_guard lock(mutex);
@@ -239,6 +244,8 @@ class Judge {
   void evaluate(const Rules& rules, std::size_t i, std::vector<Bounded>& out) const {
     const UseRules scope(rules);
     expected.bounded(i, out);
+    for (std::size_t s = 0; s < scalars.size(); ++s)
+      if (!scalars[s].given) out[s] = Bounded(0.0f);
   }
 
   void store(std::vector<Bounded>& all) const {
@@ -375,7 +382,7 @@ class Judge {
   // Offenders are checked in the order of their index, so the first that fails ends it.
   bool inside(std::size_t i, std::size_t& ambiguous) const {
     std::vector<Bounded> allowed(scalars.size());
-    expected.bounded(i, allowed);
+    evaluate(rules(), i, allowed);
     ambiguous += std::ranges::any_of(allowed, &Bounded::ambiguous);
     store(allowed);
     for (std::size_t s = 0; s < scalars.size(); ++s) {

@@ -8,9 +8,9 @@ namespace {
 
 Struct sample() {
   return describe<Sample>("Sample", field("normal", &Sample::normal),
-                          field("roughness", &Sample::roughness), field("view", &Sample::view),
-                          field("metallic", &Sample::metallic), field("light", &Sample::light),
-                          field("albedo", &Sample::albedo),
+                          field("roughness", &Sample::roughness, "roughness"),
+                          field("view", &Sample::view), field("metallic", &Sample::metallic),
+                          field("light", &Sample::light), field("albedo", &Sample::albedo),
                           field("irradiance", &Sample::irradiance));
 }
 
@@ -29,10 +29,17 @@ const bool registered = registerKernel({
     .buffers = {{"samples", kSamples, Access::kRead, sample()},
                 {"results", kResults, Access::kWrite, shaded()}},
     .push = describe<Evaluate>("Evaluate", field("count", &Evaluate::count)),
-    .groupSize = {kGroupSize, 1, 1},
-    .grid = coveringGrid({kGroupSize, 1, 1}),
     .features = {"scalarBlockLayout"},
     .deterministic = true,
+    .conventions = {{"roughness", {"perceptual", "alpha"}}},
+    .functions = {.file = "brdf/evaluate.functions.glsl",
+                  .slots = {{.name = "D", .output = "results.D"},
+                            {.name = "G", .output = "results.G"},
+                            {.name = "F", .output = "results.F"},
+                            {.name = "ambientF", .output = "results.ambientF"},
+                            {.name = "diffuse", .output = "results.diffuse"},
+                            {.name = "specular", .output = "results.specular"},
+                            {.name = "radiance", .output = "results.radiance"}}},
     .summary = "Cook-Torrance D, G, F, lobes and shaded radiance for arrays of inputs",
 });
 

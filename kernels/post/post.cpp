@@ -11,7 +11,8 @@ ImageSpec gbuffer(const char* name, uint binding, PixelFormat format) {
           .binding = binding,
           .access = Access::kRead,
           .type = "texture2D",
-          .format = format};
+          .format = format,
+          .meaning = format == PixelFormat::kD32 ? "depth" : ""};
 }
 
 const bool registered = registerKernel({
@@ -30,10 +31,9 @@ const bool registered = registerKernel({
     .push = describe<Views>("Views", field("size", &Views::size), field("mode", &Views::mode),
                             field("near", &Views::near), field("far", &Views::far),
                             field("splits", &Views::splits)),
-    .groupSize = {kGroupSide, kGroupSide, 1},
-    .grid = coveringGrid({kGroupSide, kGroupSide, 1}),
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
     .deterministic = true,
+    .conventions = {{"y", {"down", "up"}}, {"depth", {"reverse", "standard"}}},
     .summary = "debug views: albedo, normal, depth, shadow cascades",
 });
 

@@ -21,8 +21,6 @@ KernelRecord entry(const char* name, uint operation) {
                   {"results", kResults, Access::kWrite,
                    describe<Result>("Result", field("value", &Result::value))}},
       .push = describe<Measure>("Measure", field("count", &Measure::count)),
-      .groupSize = {kGroupSize, 1, 1},
-      .grid = coveringGrid({kGroupSize, 1, 1}),
       .features = {"scalarBlockLayout"},
       .specialization = {{kOperationId, operation}},
       .deterministic = true,
@@ -42,8 +40,6 @@ KernelRecord copies(const char* name, const char* file, const BufferSpec& buffer
           .buffers = {buffer},
           .images = {image},
           .push = describe<Pixels>("Pixels", field("size", &Pixels::size)),
-          .groupSize = {kGroupSide, kGroupSide, 1},
-          .grid = coveringGrid({kGroupSide, kGroupSide, 1}),
           .features = {"scalarBlockLayout"},
           .summary = summary};
 }
@@ -85,8 +81,6 @@ KernelRecord sample(const char* name, PixelFormat format, SamplerDescription sam
                       .format = format,
                       .sampler = sampler}},
           .push = describe<Measure>("Measure", field("count", &Measure::count)),
-          .groupSize = {kGroupSize, 1, 1},
-          .grid = coveringGrid({kGroupSize, 1, 1}),
           .features = {"scalarBlockLayout"},
           .summary = compares ? "device model: comparisons with the nearest texel"
                               : "device model: textureLod of one format, filter and address mode"};

@@ -30,10 +30,12 @@ const bool registered = registerKernel({
         "Resolve", field("size", &Resolve::size), field("exposure", &Resolve::exposure),
         field("bloomIntensity", &Resolve::bloomIntensity), field("curve", &Resolve::curve),
         field("transfer", &Resolve::transfer)),
-    .groupSize = {kGroupSide, kGroupSide, 1},
-    .grid = coveringGrid({kGroupSide, kGroupSide, 1}),
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
     .deterministic = true,
+    .conventions = {{"y", {"down", "up"}}},
+    .functions = {.file = "tonemap/resolve.functions.glsl",
+                  .slots = {{.name = "curve", .push = "curve"},
+                            {.name = "transfer", .push = "transfer"}}},
     .summary = "bloom, exposure, tone curve and transfer function of an HDR frame",
 });
 

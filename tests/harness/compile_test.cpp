@@ -49,7 +49,7 @@ class Compile : public testing::Test {
   /// What the compiler says of a file; empty if it compiles.
   std::string complaint(const fs::path& file, const CompileOptions& options = {}) const {
     try {
-      compileGlsl(file, options);
+      compileShader(file, options);
       return {};
     } catch (const UsageError& error) {
       return error.what();
@@ -76,7 +76,7 @@ void main() { to[gl_GlobalInvocationID.x] = noise(float(gl_LocalInvocationIndex)
       fmt::format("glslangValidator --quiet -V -g --target-env vulkan1.2 -I{} -o {} {}",
                   folder.string(), spirv.string(), file.string());
   ASSERT_EQ(std::system(command.c_str()), 0);
-  EXPECT_EQ(disassemble(compileGlsl(file, {.includeFolders = {folder}, .defines = {}})),
+  EXPECT_EQ(disassemble(compileShader(file, {.includeFolders = {folder}, .defines = {}})),
             disassemble(readSpirv(spirv)));
 }
 
@@ -104,7 +104,7 @@ TEST_F(Compile, DefinesReachTheShader) {
 TEST_F(Compile, TheEntryPointHasTheNameAskedFor) {
   const fs::path file = write("main.comp", kHead + kMain);
   const auto words =
-      compileGlsl(file, {.includeFolders = {}, .defines = {}, .entryPoint = "resolve"});
+      compileShader(file, {.includeFolders = {}, .defines = {}, .entryPoint = "resolve"});
   EXPECT_TRUE(contains(disassemble(words), "OpEntryPoint GLCompute %resolve \"resolve\""));
 }
 

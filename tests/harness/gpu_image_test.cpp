@@ -58,7 +58,7 @@ GpuProgram build(Gpu& gpu, const std::string& body, std::vector<BindingSlot> slo
       std::filesystem::temp_directory_path() / fmt::format("gnomon-image-test-{}.comp", getpid());
   std::ofstream(file) << "#version 450\nlayout(local_size_x = 1) in;\n" << body;
   ProgramDescription description;
-  description.spirv = compileGlsl(file, {});
+  description.spirv = compileShader(file, {});
   std::filesystem::remove(file);
   description.slots = std::move(slots);
   return gpu.build(description);

@@ -34,7 +34,7 @@ std::vector<std::uint32_t> compile(const std::string& body) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / fmt::format("gnomon-gpu-test-{}.comp", getpid());
   std::ofstream(file) << "#version 450\n#extension GL_EXT_scalar_block_layout : require\n" << body;
-  std::vector<std::uint32_t> words = compileGlsl(file, {});
+  std::vector<std::uint32_t> words = compileShader(file, {});
   std::filesystem::remove(file);
   return words;
 }

@@ -44,8 +44,7 @@ KernelRecord recordOf(bool signOfZero = false) {
       .buffers = {{"values", 0, Access::kRead, describe<Number>("Number", field("x", &Number::x))},
                   {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
       .push = describe<Push>("Push", field("count", &Push::count)),
-      .groupSize = {64, 1, 1},
-      .grid = coveringGrid({64, 1, 1}),
+      .grid = {},
       .features = {"scalarBlockLayout"}};
 }
 
@@ -63,7 +62,7 @@ layout(set = 0, binding = 1, scalar) buffer Results { Number results[]; };
 void main() {
   uint i = gl_GlobalInvocationID.x;
 )" << body << "\n}\n";
-  SpirvWords words = compileGlsl(file, {});
+  SpirvWords words = compileShader(file, {});
   std::filesystem::remove(file);
   return words;
 }
@@ -86,7 +85,7 @@ class Judge : public testing::Test {
   Verdict judged(const std::string& body, const std::vector<Number>& values, F f,
                  bool signOfZero = false) {
     record = recordOf(signOfZero);
-    const Subject subject(gpu(), record, kernelWith(body), "judge_test.comp");
+    const Subject subject(gpu(), record, {.words = kernelWith(body), .origin = "judge_test.comp"});
     const Push push{static_cast<uint>(values.size())};
     const Observation seen =
         observe(subject, {.inputs = {{"values", std::as_bytes(std::span(values))}},
@@ -284,7 +283,8 @@ TEST_F(Judge, RefusesAModuleThatContradictsTheContractAndNamesBothSides) {
   record.buffers[1].element.size = 12;
   record.push.size = 8;
   try {
-    const Subject subject(gpu(), record, kernelWith(kGuarded), "judge_test.comp");
+    const Subject subject(gpu(), record,
+                          {.words = kernelWith(kGuarded), .origin = "judge_test.comp"});
     FAIL() << "accepted";
   } catch (const UsageError& error) {
     const std::string text = error.what();
@@ -299,7 +299,8 @@ TEST_F(Judge, NamesTheFeatureThatADeviceLacks) {
   record = recordOf();
   record.features = {"featureThatNobodyHas"};
   try {
-    const Subject subject(gpu(), record, kernelWith(kGuarded), "judge_test.comp");
+    const Subject subject(gpu(), record,
+                          {.words = kernelWith(kGuarded), .origin = "judge_test.comp"});
     FAIL() << "accepted";
   } catch (const Unsupported& why) {
     EXPECT_NE(std::string(why.what()).find("featureThatNobodyHas"), std::string::npos);

@@ -39,7 +39,7 @@ SpirvWords compile(const std::string& body) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / fmt::format("gnomon-order-{}.comp", getpid());
   std::ofstream(file) << "#version 450\n#extension GL_EXT_scalar_block_layout : require\n" << body;
-  const SpirvWords words = compileGlsl(file, {});
+  const SpirvWords words = compileShader(file, {});
   std::filesystem::remove(file);
   return words;
 }
@@ -532,7 +532,7 @@ TEST_F(OrderTwin, TwinsOfEveryKernelAreValid) {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(kernels)) {
     if (entry.path().extension() != ".comp") continue;
-    const SpirvWords plain = compileGlsl(entry.path(), {.includeFolders = {kernels}});
+    const SpirvWords plain = compileShader(entry.path(), {.includeFolders = {kernels}});
     EXPECT_EQ(validateSpirv(twinOf(plain)), "") << entry.path();
     EXPECT_EQ(validateSpirv(strictTwin(twinOf(plain), {true, true})), "") << entry.path();
     ++count;

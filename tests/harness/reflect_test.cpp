@@ -25,7 +25,7 @@ SpirvWords compile(const std::string& body, const std::string& ending = ".comp",
       std::filesystem::temp_directory_path() / fmt::format("gnomon-reflect-{}{}", getpid(), ending);
   std::ofstream(file) << "#version 460\n#extension GL_EXT_scalar_block_layout : require\n" << body;
   const SpirvWords words =
-      compileGlsl(file, {.includeFolders = {}, .defines = {}, .entryPoint = entryPoint});
+      compileShader(file, {.includeFolders = {}, .defines = {}, .entryPoint = entryPoint});
   std::filesystem::remove(file);
   return words;
 }

@@ -35,7 +35,7 @@ std::filesystem::path scratch(const std::string& ending) {
 SpirvWords compile(const std::string& body) {
   const std::filesystem::path file = scratch(".comp");
   std::ofstream(file) << "#version 450\n" << body;
-  const SpirvWords words = compileGlsl(file, {});
+  const SpirvWords words = compileShader(file, {});
   std::filesystem::remove(file);
   return words;
 }

@@ -142,6 +142,7 @@ TEST_F(TonemapResolve, NanIsBlackAndInfinityIsWhite) {
     for (const uint transfer : kTransfers) {
       frame.push.curve = curve;
       frame.push.transfer = transfer;
+      if (!applies(frame.push)) continue;
       const std::vector<vec4> pixels = shown(frame);
       EXPECT_EQ(pixels[0], pixels[3]) << "NaN, curve " << curve << ", transfer " << transfer;
       EXPECT_EQ(pixels[1], pixels[3]) << "-Inf, curve " << curve << ", transfer " << transfer;
@@ -159,6 +160,7 @@ TEST_F(TonemapResolve, OneStopMoreIsTwiceTheLight) {
   for (const uint curve : kCurves) {
     brighter.push.curve = curve;
     brighter.push.transfer = kSrgb;
+    if (!applies(brighter.push)) continue;
     Frame scaled = brighter;
     brighter.push.exposure *= 2;
     for (Picture* picture : {&scaled.hdr, &scaled.bloom})
@@ -186,6 +188,7 @@ TEST_F(TonemapResolve, GreyRampsRise) {
     for (const uint transfer : kTransfers) {
       frame.push.curve = curve;
       frame.push.transfer = transfer;
+      if (!applies(frame.push)) continue;
       const std::vector<vec4> pixels = shown(frame);
       for (std::size_t i = 1; i < pixels.size(); ++i) {
         ASSERT_GE(pixels[i].x, pixels[i - 1].x)
@@ -202,6 +205,7 @@ TEST_F(TonemapResolve, EveryResultIsInRangeWithAlphaOne) {
   for (Frame frame : {degenerate(), highlights(kSize, caseSeed()), shadows(kSize, caseSeed())})
     for (const uint curve : kCurves) {
       frame.push.curve = curve;
+      if (!applies(frame.push)) continue;
       for (const vec4& pixel : shown(frame)) {
         for (int c = 0; c < 3; ++c) ASSERT_TRUE(pixel[c] >= 0 && pixel[c] <= 1) << pixel[c];
         ASSERT_EQ(pixel.w, 1);

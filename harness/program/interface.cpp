@@ -1,0 +1,480 @@
+#include "harness/program/interface.h"
+
+#include <algorithm>
+#include <bit>
+#include <set>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "harness/error.h"
+
+namespace gnomon {
+namespace {
+
+constexpr unsigned kWord = 4;
+
+/// "items[].n" and "items[4].n" name the same member of an element.
+std::string withoutSizes(const std::string& path) {
+  std::string plain;
+  bool inside = false;
+  for (const char c : path) {
+    if (c == '[') inside = true;
+    if (!inside) plain += c;
+    if (c == ']') inside = false;
+  }
+  return plain;
+}
+
+/// Components of "vec3", "uint", "mat4".
+unsigned components(const std::string& type) {
+  if (type.starts_with("mat")) {
+    const unsigned columns = static_cast<unsigned>(type[3] - '0');
+    const std::size_t by = type.find('x');
+    return columns *
+           (by == std::string::npos ? columns : static_cast<unsigned>(type[by + 1] - '0'));
+  }
+  const char last = type.back();
+  return last >= '2' && last <= '4' ? static_cast<unsigned>(last - '0') : 1;
+}
+
+bool isFloat(const std::string& type) {
+  return type == "float" || type.starts_with("vec") || type.starts_with("mat");
+}
+
+/// The same scalars, or a wider vector of them: a contract's vec3 often stands in a vec4.
+bool fits(const Field& ours, const ReflectedMember& theirs) {
+  if (ours.type == theirs.type) return true;
+  if (ours.type.starts_with("mat") || theirs.type.starts_with("mat")) return false;
+  if (theirs.size != kWord * components(theirs.type)) return false;  // 16 or 64 bits
+  return isFloat(ours.type) == isFloat(theirs.type) && components(theirs.type) >= ours.scalars;
+}
+
+/// Collects what contradicts, and says it all at once.
+class Matcher {
+ public:
+  Matcher(const KernelRecord& r, const Reflection& m, const Adapter* a)
+      : record(r), module(m), adapter(a) {}
+
+  Interface match() {
+    result.entryPoint = module.entryPoint;
+    result.groupSize = result.covered = module.groupSize;
+    if (adapter != nullptr && adapter->grid) result.covered = *adapter->grid;
+    result.specialization = record.specialization;
+    addBuffers();
+    for (const BufferSpec& b : record.buffers) placeBuffer(b);
+    placePush();
+    for (const ImageSpec& i : record.images) placeImage(i);
+    takeConstants();
+    takeSpecialization();
+    refuseLeftovers();
+    return std::move(result);
+  }
+
+  const std::vector<std::string>& contradictions() const { return lines; }
+
+ private:
+  bool named(const std::string& key) const {
+    return adapter != nullptr && adapter->fields.contains(key);
+  }
+
+  void addBuffers() {
+    result.pushBytes = module.pushBytes;
+    for (const ReflectedBinding& b : module.bindings) {
+      if (b.kind != "storage buffer" && b.kind != "uniform buffer") continue;
+      ModuleBuffer buffer{
+          .name = b.name,
+          .slot = {.set = b.set,
+                   .binding = b.binding,
+                   .kind = b.kind == "storage buffer" ? BindingSlot::Kind::kStorageBuffer
+                                                      : BindingSlot::Kind::kUniformBuffer},
+          .stride = b.stride,
+          .bytes = b.stride > 0 ? 0 : b.bytes};
+      for (const ReflectedMember& m : b.members)  // a header, then a runtime array
+        if (b.stride == 0 && !m.arrays.empty() && m.arrays[0].count == 0) {
+          buffer.stride = m.arrays[0].stride;
+          buffer.bytes = std::min(buffer.bytes, m.offset);
+        }
+      blocks.push_back(&b);
+      result.buffers.push_back(buffer);
+    }
+  }
+
+  /// The binding that a contract's name stands for: as the adapter says, by name, or by number
+  /// where the module has no names.
+  const ReflectedBinding* binding(const std::string& name, unsigned number, const char* what,
+                                  bool required) {
+    const auto at = [&](unsigned set, unsigned slot) {
+      return std::ranges::find_if(module.bindings, [&](const ReflectedBinding& b) {
+        return b.set == set && b.binding == slot;
+      });
+    };
+    auto found = module.bindings.end();
+    if (adapter != nullptr && adapter->bindings.contains(name)) {
+      const auto [set, slot] = adapter->bindings.at(name);
+      found = at(set, slot);
+      if (found == module.bindings.end()) {
+        lines.push_back(
+            fmt::format("'bindings' puts '{}' at set {}, binding {}, where the shader has nothing",
+                        name, set, slot));
+        return nullptr;
+      }
+    } else {
+      found = std::ranges::find(module.bindings, name, &ReflectedBinding::name);
+      if (found == module.bindings.end()) {
+        const auto unnamed = at(0, number);
+        if (unnamed != module.bindings.end() && unnamed->name.empty()) found = unnamed;
+      }
+    }
+    if (found != module.bindings.end()) {
+      used.insert(&*found);
+      return &*found;
+    }
+    if (required)
+      lines.push_back(
+          fmt::format("the shader has no {} '{}', which the contract binds at set 0, binding {}",
+                      what, name, number));
+    return nullptr;
+  }
+
+  unsigned indexOf(const ReflectedBinding* block) const {
+    return static_cast<unsigned>(std::ranges::find(blocks, block) - blocks.begin());
+  }
+
+  Place placeIn(const Field& ours, const ReflectedBinding* block, const ReflectedMember& m) {
+    taken.insert(&m);
+    return {.field = ours,
+            .buffer = block == nullptr ? Place::kPush : indexOf(block),
+            .offset = m.offset,
+            .matrixStride = m.matrixStride,
+            .rowMajor = m.rowMajor};
+  }
+
+  /// A member by its path, below its binding's name or not.
+  const ReflectedMember* member(const std::vector<ReflectedMember>& members,
+                                const std::string& block, const std::string& path) const {
+    const std::string wanted = withoutSizes(path);
+    for (const ReflectedMember& m : members) {
+      const std::string plain = withoutSizes(m.path);
+      if (plain == wanted || (!block.empty() && block + "." + plain == wanted)) return &m;
+    }
+    return nullptr;
+  }
+
+  /// A parameter may stand in a struct of its block: `uniform Push { Evaluate push; }`.
+  const ReflectedMember* parameter(const std::vector<ReflectedMember>& members,
+                                   const std::string& name) const {
+    if (const ReflectedMember* found = member(members, {}, name)) return found;
+    const auto nested = std::ranges::find_if(members, [&](const ReflectedMember& m) {
+      return withoutSizes(m.path).ends_with("." + name);
+    });
+    return nested == members.end() ? nullptr : &*nested;
+  }
+
+  /// Where the adapter's path leads: any block of the module, or its push constants.
+  std::optional<Place> adaptedPlace(const std::string& key, const Field& ours,
+                                    const ReflectedBinding* preferred) {
+    const std::string& path = adapter->fields.at(key);
+    const ReflectedBinding* block = preferred;
+    const ReflectedMember* found =
+        preferred == nullptr ? nullptr : member(preferred->members, preferred->name, path);
+    for (std::size_t i = 0; found == nullptr && i < blocks.size(); ++i) {
+      block = blocks[i];
+      found = member(block->members, block->name, path);
+    }
+    if (found == nullptr) {
+      block = nullptr;
+      found = member(module.push, "push", path);
+    }
+    if (found == nullptr) {
+      lines.push_back(
+          fmt::format("'fields' maps {} to '{}', which the shader does not have", key, path));
+      return std::nullopt;
+    }
+    if (!fits(ours, *found)) {
+      lines.push_back(
+          fmt::format("'fields' maps {}, a {}, to '{}', a {}", key, ours.type, path, found->type));
+      return std::nullopt;
+    }
+    if (block != nullptr) used.insert(block);
+    return placeIn(ours, block, *found);
+  }
+
+  /// By name; by offset where the module has no names.
+  std::optional<Place> sameNamed(const std::string& where, const Field& ours,
+                                 const ReflectedBinding& block) {
+    const ReflectedMember* found = member(block.members, {}, ours.name);
+    if (found == nullptr)
+      for (const ReflectedMember& m : block.members)
+        if (m.path.find_first_not_of(".[]") == std::string::npos && m.offset == ours.offset)
+          found = &m;
+    if (found == nullptr) {
+      missing.push_back(
+          fmt::format("{} has no member '{}' in the shader; the contract has {} {} at byte {}",
+                      where, ours.name, ours.type, ours.name, ours.offset));
+      return std::nullopt;
+    }
+    if (!fits(ours, *found) || (adapter == nullptr && found->type != ours.type)) {
+      lines.push_back(fmt::format("{}.{} is {} in the shader, {} in the contract", where, ours.name,
+                                  found->type, ours.type));
+    } else if (adapter == nullptr && found->offset != ours.offset) {
+      lines.push_back(fmt::format("{}.{} is at byte {} in the shader, {} in the contract", where,
+                                  ours.name, found->offset, ours.offset));
+    }
+    return placeIn(ours, &block, *found);
+  }
+
+  void placeBuffer(const BufferSpec& spec) {
+    const bool elsewhere = std::ranges::all_of(
+        spec.element.fields, [&](const Field& f) { return named(spec.name + "." + f.name); });
+    const ReflectedBinding* block = binding(spec.name, spec.binding, "buffer", !elsewhere);
+    if (block != nullptr && block->kind != "storage buffer" && block->kind != "uniform buffer") {
+      lines.push_back(fmt::format("'{}' is a {} in the shader, a storage buffer in the contract",
+                                  spec.name, block->kind));
+      block = nullptr;
+    }
+    if (adapter == nullptr && block != nullptr) compareStrictly(spec, *block);
+    std::vector<std::optional<Place>> places;
+    for (const Field& f : spec.element.fields) {
+      const std::string key = spec.name + "." + f.name;
+      missing.clear();
+      std::optional<Place> place;
+      if (named(key))
+        place = adaptedPlace(key, f, block);
+      else if (block != nullptr)
+        place = sameNamed(spec.name, f, *block);
+      if (place && spec.access == Access::kWrite) result.buffers[place->buffer].written = true;
+      // An output that a foreign kernel does not give is told, not an error; an input it need not
+      // read.
+      if (adapter == nullptr) lines.insert(lines.end(), missing.begin(), missing.end());
+      if (!place && spec.access == Access::kWrite) result.unmapped.push_back(key);
+      places.push_back(place);
+    }
+    if (adapter != nullptr && spec.access == Access::kWrite &&
+        std::ranges::none_of(places, [](const auto& p) { return p.has_value(); }))
+      lines.push_back(fmt::format("no field of the output '{}' is found in the shader", spec.name));
+    result.places[spec.name] = std::move(places);
+  }
+
+  void compareStrictly(const BufferSpec& spec, const ReflectedBinding& block) {
+    if (block.set != 0 || block.binding != spec.binding)
+      lines.push_back(fmt::format(
+          "'{}' is at set {}, binding {} in the shader, set 0, binding {} in the contract",
+          spec.name, block.set, block.binding, spec.binding));
+    if (block.stride != spec.element.size)
+      lines.push_back(
+          fmt::format("an element of '{}' takes {} bytes in the shader, {} in the contract",
+                      spec.name, block.stride, spec.element.size));
+  }
+
+  void placePush() {
+    if (adapter == nullptr && module.pushBytes != record.push.size)
+      lines.push_back(fmt::format("push constants take {} bytes in the shader, {} in the contract",
+                                  module.pushBytes, record.push.size));
+    for (const Field& f : record.push.fields) {
+      const std::string key = "push." + f.name;
+      std::optional<Place> place;
+      if (named(key))
+        place = adaptedPlace(key, f, nullptr);
+      else
+        place = pushNamed(f);
+      if (place) result.push.push_back(*place);
+    }
+  }
+
+  /// Push constants are often parameters in a uniform buffer elsewhere.
+  std::optional<Place> pushNamed(const Field& f) {
+    const ReflectedMember* found = parameter(module.push, f.name);
+    if (found == nullptr && adapter == nullptr)
+      for (const ReflectedMember& m : module.push)
+        if (m.path.empty() && m.offset == f.offset) found = &m;
+    if (found != nullptr &&
+        (!fits(f, *found) || (adapter == nullptr && found->offset != f.offset))) {
+      lines.push_back(fmt::format(
+          "the push constant '{}' is {} at byte {} in the shader, {} at byte {} in the contract",
+          f.name, found->type, found->offset, f.type, f.offset));
+      return std::nullopt;
+    }
+    if (found != nullptr) return placeIn(f, nullptr, *found);
+    for (const ReflectedBinding* block : blocks) {
+      if (block->stride != 0 || block->kind != "uniform buffer") continue;
+      const ReflectedMember* m = parameter(block->members, f.name);
+      if (m == nullptr || !fits(f, *m)) continue;
+      used.insert(block);
+      return placeIn(f, block, *m);
+    }
+    return std::nullopt;
+  }
+
+  /// An image and its sampler may be one variable or two, and an input may be a storage image.
+  static bool agree(const std::string& ours, const std::string& theirs) {
+    const auto shape = [](const std::string& type) {
+      const std::size_t at = type.find_first_of("123C");
+      return at == std::string::npos ? type : type.substr(at);
+    };
+    if (ours == theirs) return true;
+    if (ours.starts_with("image")) return false;
+    return ours != "sampler" && shape(ours) == shape(theirs);
+  }
+
+  void placeImage(const ImageSpec& spec) {
+    const ReflectedBinding* found = binding(spec.name, spec.binding, "image", true);
+    if (found == nullptr) return;
+    if (!(adapter == nullptr ? found->type == spec.type : agree(spec.type, found->type))) {
+      lines.push_back(fmt::format("'{}' is {} in the shader, {} in the contract", spec.name,
+                                  found->type.empty() ? "a " + found->kind : found->type,
+                                  spec.type));
+      return;
+    }
+    if (adapter == nullptr && (found->set != 0 || found->binding != spec.binding))
+      lines.push_back(fmt::format(
+          "'{}' is at set {}, binding {} in the shader, set 0, binding {} in the contract",
+          spec.name, found->set, found->binding, spec.binding));
+    result.images.push_back(
+        {.name = spec.name,
+         .slot = {.set = found->set, .binding = found->binding, .kind = kindOf(*found)},
+         .asArray = found->type.ends_with("2DArray")});
+  }
+
+  static BindingSlot::Kind kindOf(const ReflectedBinding& b) {
+    if (b.kind == "storage image") return BindingSlot::Kind::kStorageImage;
+    if (b.kind == "combined image sampler") return BindingSlot::Kind::kCombined;
+    return b.kind == "sampler" ? BindingSlot::Kind::kSampler : BindingSlot::Kind::kSampledImage;
+  }
+
+  void takeConstants() {
+    if (adapter == nullptr) return;
+    for (const auto& [key, value] : adapter->constants) {
+      if (presetNamed(key, value)) continue;
+      const auto push = std::ranges::find(record.push.fields, key, &Field::name);
+      if (push == record.push.fields.end()) {
+        lines.push_back(fmt::format(
+            "'constants' gives '{}' a value, which neither the shader nor the contract has", key));
+        continue;
+      }
+      if (std::ranges::any_of(result.push, [&](const Place& p) { return p.field.name == key; }))
+        lines.push_back(
+            fmt::format("'constants' fixes '{}', which the shader takes from the contract", key));
+      result.fixed[key] = value;
+    }
+  }
+
+  bool presetNamed(const std::string& key, double value) {
+    const auto preset = [&](const ReflectedMember& m, unsigned buffer) {
+      if (taken.contains(&m)) return false;
+      taken.insert(&m);
+      result.presets.push_back({buffer, m.offset, bitsOf(m.type, value)});
+      return true;
+    };
+    if (const ReflectedMember* m = member(module.push, "push", key))
+      return preset(*m, Place::kPush);
+    for (const ReflectedBinding* block : blocks)
+      if (const ReflectedMember* m = member(block->members, block->name, key)) {
+        used.insert(block);
+        return preset(*m, indexOf(block));
+      }
+    return false;
+  }
+
+  static std::uint32_t bitsOf(const std::string& type, double value) {
+    if (isFloat(type)) return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    if (value < 0) return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
+    return static_cast<std::uint32_t>(value);
+  }
+
+  void takeSpecialization() {
+    if (adapter == nullptr) return;
+    for (const auto& [key, value] : adapter->specialization) {
+      const auto found = std::ranges::find_if(module.constants, [&](const ReflectedConstant& c) {
+        return (!c.name.empty() && c.name == key) || std::to_string(c.id) == key;
+      });
+      if (found == module.constants.end()) {
+        lines.push_back(fmt::format(
+            "'specialization' gives '{}' a value, but the shader has no such constant", key));
+        continue;
+      }
+      result.specialization[found->id] = bitsOf(found->type, value);
+      for (unsigned axis = 0; axis < 3; ++axis)
+        if (module.groupSizeIds[axis] == found->id) resizeGroup(axis, value);
+    }
+  }
+
+  void resizeGroup(unsigned axis, double value) {
+    const auto threads = static_cast<unsigned>(value);
+    result.groupSize[axis] = threads;
+    if (!adapter->grid) result.covered[axis] = threads;
+  }
+
+  void refuseLeftovers() {
+    for (const ReflectedBinding& b : module.bindings) {
+      if (b.kind == "sampler" && adapter != nullptr && !used.contains(&b)) {
+        result.images.push_back(
+            {.slot = {.set = b.set, .binding = b.binding, .kind = BindingSlot::Kind::kSampler}});
+        continue;
+      }
+      if (!used.contains(&b))
+        lines.push_back(fmt::format(
+            "the shader binds {} '{}' (set {}, binding {}), which the contract does not know",
+            b.kind, b.name, b.set, b.binding));
+    }
+    for (const ReflectedBinding* block : blocks) {
+      if (!used.contains(block)) continue;
+      const bool parameters = block->kind == "uniform buffer";
+      if (adapter == nullptr || parameters) refuseMembers(block->members, block->name, parameters);
+    }
+    if (adapter != nullptr || record.push.size == module.pushBytes)
+      refuseMembers(module.push, "push", true);
+  }
+
+  void refuseMembers(const std::vector<ReflectedMember>& members, const std::string& block,
+                     bool parameters) {
+    for (const ReflectedMember& m : members) {
+      if (taken.contains(&m)) continue;
+      lines.push_back(
+          parameters && adapter != nullptr
+              ? fmt::format(
+                    "nothing gives '{}.{}' ({}) a value: name it in 'fields' or 'constants'", block,
+                    m.path, m.type)
+              : fmt::format("{}.{} ({}) stands in the shader but not in the contract", block,
+                            m.path, m.type));
+    }
+  }
+
+  const KernelRecord& record;
+  const Reflection& module;
+  const Adapter* adapter;
+  Interface result;
+  std::vector<const ReflectedBinding*> blocks;  ///< as result.buffers
+  std::set<const ReflectedBinding*> used;
+  std::set<const ReflectedMember*> taken;
+  std::vector<std::string> lines;
+  std::vector<std::string> missing;  ///< of the field at hand
+};
+
+void refuseConventions(const KernelRecord& record, const Adapter& adapter,
+                       std::vector<std::string>& lines) {
+  for (const auto& [name, value] : adapter.conventions) {
+    const auto known = record.conventions.find(name);
+    if (known == record.conventions.end())
+      lines.push_back(fmt::format("the convention '{}' says nothing for this kernel", name));
+    else if (std::ranges::find(known->second, value) == known->second.end())
+      lines.push_back(fmt::format("the convention '{}' is one of {}, not '{}'", name,
+                                  fmt::join(known->second, ", "), value));
+  }
+}
+
+}  // namespace
+
+Interface interfaceOf(const KernelRecord& record, const Reflection& reflection,
+                      const Adapter* adapter, const std::string& origin) {
+  Matcher matcher(record, reflection, adapter);
+  Interface result = matcher.match();
+  std::vector<std::string> lines = matcher.contradictions();
+  if (adapter != nullptr) refuseConventions(record, *adapter, lines);
+  if (!lines.empty())
+    throw UsageError(fmt::format("{} does not fit the contract of {}:\n  {}", origin, record.name(),
+                                 fmt::join(lines, "\n  ")));
+  return result;
+}
+
+}  // namespace gnomon
