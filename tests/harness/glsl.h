@@ -1,0 +1,16 @@
+// GLSL that stands in the text of a test, as SPIR-V.
+#pragma once
+
+#include <string>
+
+#include "harness/program/compile.h"
+#include "harness/program/spirv.h"
+
+namespace gnomon {
+
+/// Compiles a whole shader. `ending` tells its stage, as the name of a file would: ".comp".
+/// Throws what compileGlsl throws.
+SpirvWords compileText(const std::string& glsl, const std::string& ending = ".comp",
+                       const CompileOptions& options = {});
+
+}  // namespace gnomon
