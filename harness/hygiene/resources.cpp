@@ -101,7 +101,8 @@ std::string Output::place(std::size_t element) const {
 Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
     : gpu(subject.gpu()), record(subject.record()), stimulus(s) {
   for (const ImageSpec& i : record.images)
-    if (i.type.starts_with("sampler")) samplers.emplace(i.name, gpu.makeSampler(i.sampler));
+    if (i.kind() == BindingSlot::Kind::kSampler || i.kind() == BindingSlot::Kind::kCombined)
+      samplers.emplace(i.name, gpu.makeSampler(i.sampler));
   for (const InputBytes& i : s.inputs) addInput(i);
   for (const OutputCount& o : s.outputs) addOutput(o);
   for (const InputImage& i : s.inputImages) addInputImage(i);
