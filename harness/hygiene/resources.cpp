@@ -110,7 +110,8 @@ Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
       memories(interface.buffers.size()),
       ownSampler(gpu.makeSampler({.linear = true})) {
   for (const ImageSpec& i : record.images)
-    if (i.type.starts_with("sampler")) samplers.emplace(i.name, gpu.makeSampler(i.sampler));
+    if (i.kind() == BindingSlot::Kind::kSampler || i.kind() == BindingSlot::Kind::kCombined)
+      samplers.emplace(i.name, gpu.makeSampler(i.sampler));
   layOut();
   packInputs();
   packParameters();

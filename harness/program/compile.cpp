@@ -94,8 +94,9 @@ EShLanguage stageOf(const fs::path& file, const std::string& stage) {
   if (ending == ".comp") return EShLangCompute;
   if (ending == ".vert") return EShLangVertex;
   if (ending == ".frag") return EShLangFragment;
-  throw UsageError(fmt::format("{}: the ending must say what it is: .comp, .hlsl, .spv or .json",
-                               file.string()));
+  throw UsageError(fmt::format(
+      "{}: the ending must say what it is: .comp, .vert or .frag (GLSL), .hlsl, .spv or .json",
+      file.string()));
 }
 
 std::string readShader(const fs::path& file) {

@@ -39,9 +39,10 @@ unsigned Struct::scalars() const {
 }
 
 BindingSlot::Kind ImageSpec::kind() const {
-  if (type.starts_with("image")) return BindingSlot::Kind::kStorageImage;
   if (type == "sampler") return BindingSlot::Kind::kSampler;
-  if (type.starts_with("sampler")) return BindingSlot::Kind::kCombined;
+  // Of integers they begin with a letter more: "uimage2D".
+  if (type.find("image") != type.npos) return BindingSlot::Kind::kStorageImage;
+  if (type.find("sampler") != type.npos) return BindingSlot::Kind::kCombined;
   return BindingSlot::Kind::kSampledImage;
 }
 

@@ -7,16 +7,13 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <numeric>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "harness/error.h"
-#include "harness/program/compile.h"
+#include "tests/harness/glsl.h"
 
 namespace gnomon {
 namespace {
@@ -54,12 +51,8 @@ class GpuImageTest : public testing::Test {
 std::unique_ptr<Gpu> GpuImageTest::gpu;
 
 GpuProgram build(Gpu& gpu, const std::string& body, std::vector<BindingSlot> slots) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / fmt::format("gnomon-image-test-{}.comp", getpid());
-  std::ofstream(file) << "#version 450\nlayout(local_size_x = 1) in;\n" << body;
   ProgramDescription description;
-  description.spirv = compileShader(file, {});
-  std::filesystem::remove(file);
+  description.spirv = compileText("#version 450\nlayout(local_size_x = 1) in;\n" + body);
   description.slots = std::move(slots);
   return gpu.build(description);
 }

@@ -7,16 +7,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <numeric>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "harness/error.h"
-#include "harness/program/compile.h"
+#include "tests/harness/glsl.h"
 
 namespace gnomon {
 namespace {
@@ -31,12 +28,7 @@ testing::AssertionResult contains(const std::string& text, std::string_view part
 constexpr std::chrono::seconds kLimit{20};
 
 std::vector<std::uint32_t> compile(const std::string& body) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / fmt::format("gnomon-gpu-test-{}.comp", getpid());
-  std::ofstream(file) << "#version 450\n#extension GL_EXT_scalar_block_layout : require\n" << body;
-  std::vector<std::uint32_t> words = compileShader(file, {});
-  std::filesystem::remove(file);
-  return words;
+  return compileText("#version 450\n#extension GL_EXT_scalar_block_layout : require\n" + body);
 }
 
 ProgramDescription describe(const std::string& body, std::vector<BindingSlot> slots,

@@ -6,18 +6,15 @@
 // budget itself, the words of a failure.
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-
-#include <unistd.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "harness/cases/kernel_case.h"
 #include "harness/error.h"
-#include "harness/program/compile.h"
 #include "harness/verdict/verdict.h"
+#include "tests/harness/glsl.h"
 
 namespace gnomon {
 namespace {
@@ -44,15 +41,12 @@ KernelRecord recordOf(bool signOfZero = false) {
       .buffers = {{"values", 0, Access::kRead, describe<Number>("Number", field("x", &Number::x))},
                   {"results", 1, Access::kWrite, describe<Number>("Number", x)}},
       .push = describe<Push>("Push", field("count", &Push::count)),
-      .grid = {},
       .features = {"scalarBlockLayout"}};
 }
 
 /// A kernel whose main is `body`, which sees values, results, count and i.
 SpirvWords kernelWith(const std::string& body) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("gnomon_judge_" + std::to_string(getpid()) + ".comp");
-  std::ofstream(file) << R"(#version 450
+  return compileText(R"(#version 450
 #extension GL_EXT_scalar_block_layout : require
 layout(local_size_x = 64) in;
 struct Number { float x; };
@@ -61,10 +55,7 @@ layout(set = 0, binding = 0, scalar) buffer Values { Number values[]; };
 layout(set = 0, binding = 1, scalar) buffer Results { Number results[]; };
 void main() {
   uint i = gl_GlobalInvocationID.x;
-)" << body << "\n}\n";
-  SpirvWords words = compileShader(file, {});
-  std::filesystem::remove(file);
-  return words;
+)" + body + "\n}\n");
 }
 
 class Judge : public testing::Test {

@@ -3,31 +3,22 @@
 // ray tracing.
 #include "harness/program/reflect.h"
 
-#include <filesystem>
-#include <fstream>
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spirv-tools/libspirv.hpp>
 #include <spirv-tools/optimizer.hpp>
-#include <unistd.h>
 
 #include "harness/error.h"
-#include "harness/program/compile.h"
 #include "harness/program/spirv.h"
+#include "tests/harness/glsl.h"
 
 namespace gnomon {
 namespace {
 
 SpirvWords compile(const std::string& body, const std::string& ending = ".comp",
                    const std::string& entryPoint = "main") {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / fmt::format("gnomon-reflect-{}{}", getpid(), ending);
-  std::ofstream(file) << "#version 460\n#extension GL_EXT_scalar_block_layout : require\n" << body;
-  const SpirvWords words =
-      compileShader(file, {.includeFolders = {}, .defines = {}, .entryPoint = entryPoint});
-  std::filesystem::remove(file);
-  return words;
+  return compileText("#version 460\n#extension GL_EXT_scalar_block_layout : require\n" + body,
+                     ending, {.includeFolders = {}, .defines = {}, .entryPoint = entryPoint});
 }
 
 /// A member in one line: "lights[4].color vec3 @16 +12 [4 x 32]".

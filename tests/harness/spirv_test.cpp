@@ -14,8 +14,8 @@
 #include <unistd.h>
 
 #include "harness/error.h"
-#include "harness/program/compile.h"
 #include "harness/vulkan/gpu.h"
+#include "tests/harness/glsl.h"
 
 namespace gnomon {
 namespace {
@@ -27,18 +27,11 @@ testing::AssertionResult contains(const std::string& text, std::string_view part
   return testing::AssertionFailure() << "no \"" << part << "\" in: " << text;
 }
 
-std::filesystem::path scratch(const std::string& ending) {
-  return std::filesystem::temp_directory_path() /
-         fmt::format("gnomon-spirv-{}{}", getpid(), ending);
+std::filesystem::path scratchFile() {
+  return std::filesystem::temp_directory_path() / fmt::format("gnomon-spirv-{}.spv", getpid());
 }
 
-SpirvWords compile(const std::string& body) {
-  const std::filesystem::path file = scratch(".comp");
-  std::ofstream(file) << "#version 450\n" << body;
-  const SpirvWords words = compileShader(file, {});
-  std::filesystem::remove(file);
-  return words;
-}
+SpirvWords compile(const std::string& body) { return compileText("#version 450\n" + body); }
 
 SpirvWords assemble(const std::string& text, spv_target_env target = SPV_ENV_UNIVERSAL_1_5) {
   SpirvWords words;
@@ -304,7 +297,7 @@ TEST(Spirv, ValidationNamesTheFirstRuleThatIsBroken) {
 
 /// Writes bytes to a scratch file and says what reading it as SPIR-V answers.
 std::string refusal(std::string_view bytes) {
-  const std::filesystem::path file = scratch(".spv");
+  const std::filesystem::path file = scratchFile();
   std::ofstream(file, std::ios::binary) << bytes;
   std::string text;
   try {
@@ -323,7 +316,7 @@ TEST(Spirv, FilesOfEitherEndiannessAreTheSameModule) {
     for (std::size_t i = 0; swapped && i < bytes.size(); i += 4)
       std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(i),
                    bytes.begin() + static_cast<std::ptrdiff_t>(i + 4));
-    const std::filesystem::path file = scratch(".spv");
+    const std::filesystem::path file = scratchFile();
     std::ofstream(file, std::ios::binary) << bytes;
     EXPECT_TRUE(readSpirv(file) == words) << "swapped: " << swapped;
     std::filesystem::remove(file);
@@ -334,7 +327,7 @@ TEST(Spirv, FilesThatAreNoSpirvAreRefusedByName) {
   EXPECT_TRUE(contains(refusal("abc"), "not a multiple of four"));
   EXPECT_TRUE(contains(refusal("abcd"), "magic number"));
   EXPECT_TRUE(contains(refusal(""), "magic number"));
-  EXPECT_TRUE(contains(refusal("abc"), scratch(".spv").string()));
+  EXPECT_TRUE(contains(refusal("abc"), scratchFile().string()));
   EXPECT_THROW(readSpirv("/nowhere.spv"), UsageError);
   EXPECT_THROW(readSpirv(std::filesystem::temp_directory_path()), UsageError);
 }
