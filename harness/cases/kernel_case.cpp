@@ -93,10 +93,13 @@ void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
 void KernelCase::record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
                         const Struct& layout) {
   Session& session = Session::current();
-  Verdict verdict = judge(layout, seen, expected, bounds, session.policy(), caseSeed());
-  checked(verdict.elements);
-  // Another arrangement of a user's is as good as ours; ours has to be the model's own.
+  // Another arrangement of a user's is as good as ours; ours has to be the model's own, and as
+  // exact as this device is.
   const bool foreign = session.options().kernels.contains(kernelName);
+  Bounds deciding = bounds;
+  if (foreign) deciding.device.reset();
+  Verdict verdict = judge(layout, seen, expected, deciding, session.policy(), caseSeed());
+  checked(verdict.elements);
   if (!verdict.ok() ||
       (!foreign && (verdict.outsideDevice > 0 || verdict.verdict != Class::kConforms)))
     ADD_FAILURE() << session.subject(kernelName).origin() << " is " << nameOf(verdict.verdict)

@@ -1,6 +1,8 @@
 #include "harness/hygiene/pack.h"
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace gnomon {
 namespace {
@@ -32,9 +34,11 @@ void convert(std::byte* word, const Place& place, const Conventions& conventions
 }  // namespace
 
 float converted(float x, const std::string& meaning, const Conventions& conventions, Way way) {
+  if (!std::isfinite(x)) return x;
   if (meaning == "depth" && says(conventions, "depth", "standard")) return 1 - x;
   if (meaning == "roughness" && says(conventions, "roughness", "alpha") && way == Way::kIn)
-    return x * x;
+    // What is outside the range stays outside, and finite.
+    return std::copysign(std::fmin(x * x, std::numeric_limits<float>::max()), x);
   return x;
 }
 

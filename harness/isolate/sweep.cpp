@@ -13,8 +13,6 @@ namespace gnomon {
 namespace {
 
 constexpr const char* kWidthVariable = "LP_NATIVE_VECTOR_WIDTH";
-// Mesa's cache on disk does not tell programs of one width from those of another.
-constexpr const char* kNoCacheVariable = "MESA_SHADER_CACHE_DISABLE";
 constexpr unsigned kBitsPerLane = 32;
 constexpr std::array kWidths = {128u, 256u, 512u, 1024u};
 constexpr unsigned kMisreported = 1024;
@@ -63,10 +61,10 @@ void sweepWidths(Session& session, const SweepObserver& observer) {
     const std::vector<std::string> cases = casesFor(session, width);
     if (cases.empty()) continue;
     observer.begin(width / kBitsPerLane, cases.size());
-    const WorkerReport report = runWorker(
-        {.session = session.options(), .cases = cases},
-        {.environment = {{kWidthVariable, std::to_string(width)}, {kNoCacheVariable, "true"}},
-         .limit = session.limit() * static_cast<long>(cases.size())});
+    const WorkerReport report =
+        runWorker({.session = session.options(), .cases = cases},
+                  {.environment = {{kWidthVariable, std::to_string(width)}},
+                   .limit = session.limit() * static_cast<long>(cases.size())});
     addFindings(session, report, width, cases, observer);
   }
 }

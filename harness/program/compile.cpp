@@ -152,7 +152,9 @@ void prepare(glslang::TShader& shader, EShLanguage stage, const std::string& pre
   shader.setEnvInput(options.hlsl ? glslang::EShSourceHlsl : glslang::EShSourceGlsl, stage,
                      glslang::EShClientVulkan, 100);
   shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_2);
-  shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_5);
+  // glslang's HLSL declares buffers as SPIR-V 1.3 still allowed.
+  shader.setEnvTarget(glslang::EShTargetSpv,
+                      options.hlsl ? glslang::EShTargetSpv_1_3 : glslang::EShTargetSpv_1_5);
   // Not setDebugInfo(): that is for NonSemantic.Shader.DebugInfo, and without its instruction set
   // glslang 12 writes lexical scopes that refer to id 0.
 }

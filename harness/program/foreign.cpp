@@ -87,6 +87,7 @@ SpirvWords compileFunctions(Adapter& adapter, const KernelRecord& record, const 
   leaveOut(adapter, record);
   CompileOptions options = compileOptions(adapter, record, kernels);
   options.entryPoint = adapter.entry = "main";
+  options.stage = ".comp";
   return compileText(kernels / record.functions.file, entryAround(adapter, record, kernels),
                      options);
 }

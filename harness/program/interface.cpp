@@ -157,6 +157,7 @@ class Matcher {
     for (const ReflectedMember& m : members) {
       const std::string plain = withoutSizes(m.path);
       if (plain == wanted || (!block.empty() && block + "." + plain == wanted)) return &m;
+      if (plain.empty() && block == wanted) return &m;  // a bare array of scalars or vectors
     }
     return nullptr;
   }
@@ -171,33 +172,70 @@ class Matcher {
     return nested == members.end() ? nullptr : &*nested;
   }
 
+  /// A member of the module, and the component of it that a path ends in.
+  struct Found {
+    const ReflectedBinding* block = nullptr;  ///< none: push constants
+    const ReflectedMember* member = nullptr;
+    unsigned component = 0;
+  };
+
+  /// In the preferred block first, for a path may leave its name out.
+  Found memberAt(const std::string& path, const ReflectedBinding* preferred) const {
+    std::vector<const ReflectedBinding*> order = blocks;
+    if (preferred != nullptr) order.insert(order.begin(), preferred);
+    if (const std::size_t at = path.find('@'); at != std::string::npos)
+      return memberByOffset(path.substr(0, at), path.substr(at + 1), preferred);
+    for (const ReflectedBinding* block : order)
+      if (const ReflectedMember* m = member(block->members, block->name, path)) return {block, m};
+    if (const ReflectedMember* m = member(module.push, "push", path)) return {nullptr, m};
+    return {};
+  }
+
+  /// "push@8", "points@16": for modules without names.
+  Found memberByOffset(const std::string& block, const std::string& offset,
+                       const ReflectedBinding* preferred) const {
+    const auto at = [&](const std::vector<ReflectedMember>& members) -> const ReflectedMember* {
+      for (const ReflectedMember& m : members)
+        if (std::to_string(m.offset) == offset) return &m;
+      return nullptr;
+    };
+    if (block == "push") return {nullptr, at(module.push)};
+    if (preferred != nullptr) return {preferred, at(preferred->members)};
+    return {};
+  }
+
+  Found componentAt(const std::string& path, const ReflectedBinding* preferred) const {
+    Found found = memberAt(path, preferred);
+    const std::size_t dot = path.rfind('.');
+    if (found.member != nullptr || dot == std::string::npos || dot + 2 != path.size()) return found;
+    const std::size_t component = std::string_view("xyzwrgba").find(path.back());
+    if (component == std::string_view::npos) return found;
+    found = memberAt(path.substr(0, dot), preferred);
+    found.component = component % 4;
+    return found;
+  }
+
   /// Where the adapter's path leads: any block of the module, or its push constants.
   std::optional<Place> adaptedPlace(const std::string& key, const Field& ours,
                                     const ReflectedBinding* preferred) {
     const std::string& path = adapter->fields.at(key);
-    const ReflectedBinding* block = preferred;
-    const ReflectedMember* found =
-        preferred == nullptr ? nullptr : member(preferred->members, preferred->name, path);
-    for (std::size_t i = 0; found == nullptr && i < blocks.size(); ++i) {
-      block = blocks[i];
-      found = member(block->members, block->name, path);
-    }
-    if (found == nullptr) {
-      block = nullptr;
-      found = member(module.push, "push", path);
-    }
-    if (found == nullptr) {
+    const Found found = componentAt(path, preferred);
+    if (found.member == nullptr) {
       lines.push_back(
           fmt::format("'fields' maps {} to '{}', which the shader does not have", key, path));
       return std::nullopt;
     }
-    if (!fits(ours, *found)) {
-      lines.push_back(
-          fmt::format("'fields' maps {}, a {}, to '{}', a {}", key, ours.type, path, found->type));
+    const bool inside =
+        found.component == 0 || found.component + ours.scalars <= components(found.member->type);
+    if (!fits(ours, *found.member) || !inside) {
+      lines.push_back(fmt::format("'fields' maps {}, a {}, to '{}', in a {}", key, ours.type, path,
+                                  found.member->type));
       return std::nullopt;
     }
-    if (block != nullptr) used.insert(block);
-    return placeIn(ours, block, *found);
+    if (found.block != nullptr) used.insert(found.block);
+    Place place = placeIn(ours, found.block, *found.member);
+    place.offset += kWord * found.component;
+    return place;
   }
 
   /// By name; by offset where the module has no names.
@@ -243,6 +281,7 @@ class Matcher {
         place = adaptedPlace(key, f, block);
       else if (block != nullptr)
         place = sameNamed(spec.name, f, *block);
+      if (leftOut(key)) place.reset();
       if (place && spec.access == Access::kWrite) result.buffers[place->buffer].written = true;
       // An output that a foreign kernel does not give is told, not an error; an input it need not
       // read.
@@ -254,6 +293,14 @@ class Matcher {
         std::ranges::none_of(places, [](const auto& p) { return p.has_value(); }))
       lines.push_back(fmt::format("no field of the output '{}' is found in the shader", spec.name));
     result.places[spec.name] = std::move(places);
+  }
+
+  /// Functions stand for the outputs that they are given for, though the entry around them has all.
+  bool leftOut(const std::string& key) const {
+    if (adapter == nullptr || adapter->functions.empty()) return false;
+    return std::ranges::any_of(record.functions.slots, [&](const FunctionSlot& slot) {
+      return slot.output == key && !adapter->functions.contains(slot.name);
+    });
   }
 
   void compareStrictly(const BufferSpec& spec, const ReflectedBinding& block) {
@@ -352,7 +399,9 @@ class Matcher {
             "'constants' gives '{}' a value, which neither the shader nor the contract has", key));
         continue;
       }
-      if (std::ranges::any_of(result.push, [&](const Place& p) { return p.field.name == key; }))
+      // The entry around somebody's functions has them all; the functions are one curve.
+      if (adapter->functions.empty() &&
+          std::ranges::any_of(result.push, [&](const Place& p) { return p.field.name == key; }))
         lines.push_back(
             fmt::format("'constants' fixes '{}', which the shader takes from the contract", key));
       result.fixed[key] = value;
@@ -430,13 +479,14 @@ class Matcher {
                      bool parameters) {
     for (const ReflectedMember& m : members) {
       if (taken.contains(&m)) continue;
+      const bool unnamed = m.path.find_first_not_of(".[]") == std::string::npos;
+      const std::string name =
+          unnamed ? fmt::format("{}@{}", block, m.offset) : fmt::format("{}.{}", block, m.path);
       lines.push_back(
           parameters && adapter != nullptr
-              ? fmt::format(
-                    "nothing gives '{}.{}' ({}) a value: name it in 'fields' or 'constants'", block,
-                    m.path, m.type)
-              : fmt::format("{}.{} ({}) stands in the shader but not in the contract", block,
-                            m.path, m.type));
+              ? fmt::format("nothing gives '{}' ({}) a value: name it in 'fields' or 'constants'",
+                            name, m.type)
+              : fmt::format("{} ({}) stands in the shader but not in the contract", name, m.type));
     }
   }
 

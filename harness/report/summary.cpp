@@ -44,7 +44,8 @@ std::string className(const KernelSummary& k) {
 }
 
 std::string budgetText(const KernelSummary& k) {
-  if (!k.maxBudget) return "";
+  // Under the bound that is not widened an equivalent arrangement exceeds it: k tells more.
+  if (!k.maxBudget || k.verdict == Class::kEquivalent) return "";
   return k.exact ? "exact" : fmt::format("{:.3g}", *k.maxBudget);
 }
 

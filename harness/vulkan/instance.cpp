@@ -1,6 +1,8 @@
 // The instance: loader, validation layer, messages.
 #include "harness/vulkan/internal.h"
 
+#include <cstdlib>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -151,6 +153,9 @@ void Instance::create(bool validation) {
     info.enabledExtensionCount = static_cast<std::uint32_t>(kExtensions.size());
     info.ppEnabledExtensionNames = kExtensions.data();
   }
+  // Mesa's cache on disk hands code of one vector width to a process of another: a driver under
+  // test must not answer with what another made.
+  setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
   const VkResult result = vkCreateInstance(&info, nullptr, &handle);
   if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return;  // the loader found no driver
   if (result != VK_SUCCESS) throw DeviceError(callFailed("vkCreateInstance", result));

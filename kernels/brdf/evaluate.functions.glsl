@@ -27,11 +27,12 @@ void main() {
   const vec3 between = v + l;
   const bool dark = n == vec3(0.0) || v == vec3(0.0) || l == vec3(0.0) ||
                     largestComponent(between) < kShortestHalf;
-  const vec3 h = between * inversesqrt(max(dot(between, between), 1e-12));
+  const vec3 towards = between * inversesqrt(max(dot(between, between), 1e-12));
+  const vec3 h = dot(n, towards) < 0.0 ? -towards : towards;   // D is even in NoH
   const float NoV = max(clamp(dot(n, v), 0.0, 1.0), kMinNoV);  // clamped cosines
   const float NoL = clamp(dot(n, l), 0.0, 1.0);
   const float NoH = clamp(dot(n, h), 0.0, 1.0);
-  const float VoH = clamp(dot(v, h), 0.0, 1.0);
+  const float VoH = clamp(dot(v, towards), 0.0, 1.0);
   const float roughness = clamp(finiteOrZero(samples[i].roughness), kMinRoughness, 1.0);
   const float alpha = roughness * roughness;
   const float metallic = clamp(finiteOrZero(samples[i].metallic), 0.0, 1.0);

@@ -43,6 +43,12 @@ Bounded Bounded::input(float x) noexcept { return widened(Bounded(x)); }
 
 Bounded named(const Bounded& x, const char*) noexcept { return widened(x); }
 
+Bounded alsoAs(const Bounded& ours, const Bounded& other) noexcept {
+  if (rules().widenUlp == 0) return ours;
+  return detail::make(ours.value, least(ours.lo, other.lo), most(ours.hi, other.hi),
+                      ours.flags | other.flags);
+}
+
 bool admits(const Bounded& bound, float got, ZeroSign sign) noexcept {
   if (got != got) return bound.mayBeNan();
   const bool exactZero = bound.lo == 0 && bound.hi == 0 && bound.value == 0;

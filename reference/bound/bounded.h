@@ -74,6 +74,11 @@ void PrintTo(const Bounded& x, std::ostream* out);  // GoogleTest's hook
 Bounded named(const Bounded& x, const char* name) noexcept;
 inline double named(double x, const char*) noexcept { return x; }
 
+// Two expressions of one quantity, of which ours is the first. Where the rules widen, an
+// arrangement may start from either: their hull, which is no ambiguity.
+Bounded alsoAs(const Bounded& ours, const Bounded& other) noexcept;
+inline double alsoAs(double ours, double) noexcept { return ours; }
+
 // Either of the two, flags united; ambiguous unless they are the same. Keeps a's value.
 Bounded join(const Bounded& a, const Bounded& b) noexcept;
 // Any result at all, because `operation` is not specified there.

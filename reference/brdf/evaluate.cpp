@@ -73,7 +73,8 @@ T pow5(const T& x) {
 template <class T>
 T D_GGX(const Vec3<T>& nxh, const T& NoH, const T& alpha) {
   const T alpha2 = alpha * alpha;
-  const T d = dot(nxh, nxh) + NoH * NoH * alpha2;
+  const T sin2 = alsoAs(dot(nxh, nxh), T(1) - NoH * NoH);
+  const T d = sin2 + NoH * NoH * alpha2;
   return alpha2 / (pi<T>() * d * d);
 }
 
@@ -117,7 +118,7 @@ ShadedOf<T> evaluate(const Sample& s) {
   const T k = kDirect(r);
 
   ShadedOf<T> o;
-  o.D = D_GGX(nxh, dot(n, halfway) * scale, r * r);
+  o.D = D_GGX(nxh, named(dot(n, halfway) * scale, "NoH"), r * r);
   o.G = G1_Schlick(NoV, k) * G1_Schlick(NoL, k);
   o.F = F_Schlick(VoH, F0);
   o.ambientF = F_SchlickRoughness(NoV, F0, r);
