@@ -48,6 +48,28 @@ FieldVerdict fieldVerdict(const Json& j) {
           .worst = {}};
 }
 
+Json errorsJson(const DeviceErrors& errors) {
+  Json j = Json::object();
+  for (const auto& [operation, e] : errors)
+    j[std::string(nameOf(operation))] = {{"ulp", number(e.worst.ulp)},
+                                         {"absolute", number(e.worst.absolute)},
+                                         {"worstAt", number(e.worstAt)},
+                                         {"arguments", e.arguments},
+                                         {"exhaustive", e.exhaustive}};
+  return j;
+}
+
+DeviceErrors deviceErrors(const Json& j) {
+  DeviceErrors errors;
+  for (const auto& [name, e] : j.items())
+    if (const auto operation = operationNamed(name))
+      errors[*operation] = {.worst = {number(e["ulp"]), number(e["absolute"])},
+                            .worstAt = number(e["worstAt"]),
+                            .arguments = e["arguments"],
+                            .exhaustive = e["exhaustive"]};
+  return errors;
+}
+
 Json verdictJson(const Verdict& v) {
   Json j = {{"class", static_cast<int>(v.verdict)},
             {"widening", v.widening},
@@ -111,7 +133,8 @@ std::string toJson(const WorkerTask& task) {
                {"timeout", s.timeout ? Json(s.timeout->count()) : Json(nullptr)},
                {"kernels", kernels},
                {"validation", s.validation},
-               {"cases", task.cases}});
+               {"cases", task.cases},
+               {"errors", task.errors ? errorsJson(*task.errors) : Json(nullptr)}});
 }
 
 WorkerTask workerTask(std::string_view json) try {
@@ -124,6 +147,7 @@ WorkerTask workerTask(std::string_view json) try {
                   .cases = j["cases"]};
   if (const auto seconds = optional<long>(j["timeout"]))
     task.session.timeout = std::chrono::seconds(*seconds);
+  if (!j["errors"].is_null()) task.errors = deviceErrors(j["errors"]);
   for (const auto& [kernel, file] : j["kernels"].items())
     task.session.kernels[kernel] = file.get<std::string>();
   return task;
@@ -137,9 +161,12 @@ std::string toJson(const CaseRecord& r) {
             {"failed", r.failed},
             {"skipped", optional(r.skipped)},
             {"unsupported", optional(r.unsupported)},
+            {"threadsCommunicate", r.threadsCommunicate},
+            {"usesSubgroups", r.usesSubgroups},
             {"elements", r.elements},
             {"seconds", r.seconds},
             {"verdicts", Json::array()},
+            {"measured", errorsJson(r.measured)},
             {"messages", r.messages}};
   for (const Verdict& v : r.verdicts) j["verdicts"].push_back(verdictJson(v));
   return text(j);
@@ -152,13 +179,37 @@ CaseRecord caseRecord(std::string_view json) try {
                .failed = j["failed"],
                .skipped = optional<std::string>(j["skipped"]),
                .unsupported = optional<std::string>(j["unsupported"]),
+               .threadsCommunicate = j["threadsCommunicate"],
+               .usesSubgroups = j["usesSubgroups"],
                .elements = j["elements"],
                .seconds = j["seconds"],
+               .measured = deviceErrors(j["measured"]),
                .messages = j["messages"]};
   for (const Json& v : j["verdicts"]) r.verdicts.push_back(verdict(v));
   return r;
 } catch (const Json::exception& e) {
   throw UsageError(fmt::format("this is no record of a worker: {}", e.what()));
+}
+
+std::string toJson(const Preparation& p) {
+  return text({{"name", p.gpu.name},
+               {"driver", p.gpu.driver},
+               {"api", p.gpu.api},
+               {"subgroupSize", p.gpu.subgroupSize},
+               {"errors", errorsJson(p.errors)},
+               {"foreign", p.foreign}});
+}
+
+Preparation preparation(std::string_view json) try {
+  const Json j = parse(json, "preparation");
+  Preparation p{.errors = deviceErrors(j["errors"]), .foreign = j["foreign"]};
+  p.gpu.name = j["name"];
+  p.gpu.driver = j["driver"];
+  p.gpu.api = j["api"];
+  p.gpu.subgroupSize = j["subgroupSize"];
+  return p;
+} catch (const Json::exception& e) {
+  throw UsageError(fmt::format("this is no preparation of a worker: {}", e.what()));
 }
 
 }  // namespace gnomon
