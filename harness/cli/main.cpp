@@ -18,7 +18,9 @@ constexpr const char* kExit =
     "Exit status: 0 all good; 1 a kernel, a frame or a baseline is wrong; 2 usage or bad input "
     "file; 3 no usable device.";
 
-constexpr const char* kJobs = "Worker processes at a time (default: one a core: JOBS REASON)";
+constexpr const char* kJobs =
+    "Worker processes at a time (default: one a core, at most 8: a case mostly uses one, and half "
+    "a GiB)";
 
 /// "S/E=FILE", repeatable.
 void addKernelOption(CLI::App& command, SessionOptions& session) {

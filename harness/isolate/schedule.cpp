@@ -118,6 +118,9 @@ void runBatches(const Schedule& schedule, const std::vector<Batch>& batches,
   Pool(schedule, batches, observer).run();
 }
 
-unsigned defaultJobs() { return std::max(1u, std::thread::hardware_concurrency()); }
+unsigned defaultJobs() {
+  constexpr unsigned kMost = 8;
+  return std::clamp(std::thread::hardware_concurrency(), 1u, kMost);
+}
 
 }  // namespace gnomon

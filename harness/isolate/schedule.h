@@ -43,7 +43,8 @@ struct Schedule {
 void runBatches(const Schedule& schedule, const std::vector<Batch>& batches,
                 const ScheduleObserver& observer);
 
-/// How many workers run at a time where nobody says.
+/// How many workers run at a time where nobody says: one a core, since a case waits for one thing
+/// after another (compiler, device, judge), but at most 8, since each may take half a gibibyte.
 unsigned defaultJobs();
 
 }  // namespace gnomon
