@@ -39,12 +39,12 @@ Json fieldJson(const FieldVerdict& f) {
 }
 
 FieldVerdict fieldVerdict(const Json& j) {
-  return {.name = j["name"],
-          .outside = j["outside"],
-          .budget = number(j["budget"]),
-          .specBudget = number(j["specBudget"]),
-          .specWidth = number(j["specWidth"]),
-          .deviceWidth = number(j["deviceWidth"]),
+  return {.name = j.at("name"),
+          .outside = j.at("outside"),
+          .budget = number(j.at("budget")),
+          .specBudget = number(j.at("specBudget")),
+          .specWidth = number(j.at("specWidth")),
+          .deviceWidth = number(j.at("deviceWidth")),
           .worst = {}};
 }
 
@@ -63,10 +63,10 @@ DeviceErrors deviceErrors(const Json& j) {
   DeviceErrors errors;
   for (const auto& [name, e] : j.items())
     if (const auto operation = operationNamed(name))
-      errors[*operation] = {.worst = {number(e["ulp"]), number(e["absolute"])},
-                            .worstAt = number(e["worstAt"]),
-                            .arguments = e["arguments"],
-                            .exhaustive = e["exhaustive"]};
+      errors[*operation] = {.worst = {number(e.at("ulp")), number(e.at("absolute"))},
+                            .worstAt = number(e.at("worstAt")),
+                            .arguments = e.at("arguments"),
+                            .exhaustive = e.at("exhaustive")};
   return errors;
 }
 
@@ -90,22 +90,22 @@ Json verdictJson(const Verdict& v) {
 }
 
 Verdict verdict(const Json& j) {
-  Verdict v{.verdict = static_cast<Class>(j["class"].get<int>()),
-            .widening = j["widening"],
-            .output = j["output"],
-            .storage = static_cast<Storage>(j["storage"].get<int>()),
-            .elements = j["elements"],
-            .bounded = j["bounded"],
-            .truncated = j["truncated"],
-            .outside = j["outside"],
-            .outsideDevice = j["outsideDevice"],
-            .ambiguous = j["ambiguous"],
-            .reassociated = j["reassociated"],
-            .plainBudget = number(j["plainBudget"]),
+  Verdict v{.verdict = static_cast<Class>(j.at("class").get<int>()),
+            .widening = j.at("widening"),
+            .output = j.at("output"),
+            .storage = static_cast<Storage>(j.at("storage").get<int>()),
+            .elements = j.at("elements"),
+            .bounded = j.at("bounded"),
+            .truncated = j.at("truncated"),
+            .outside = j.at("outside"),
+            .outsideDevice = j.at("outsideDevice"),
+            .ambiguous = j.at("ambiguous"),
+            .reassociated = j.at("reassociated"),
+            .plainBudget = number(j.at("plainBudget")),
             .fields = {},
             .worst = {},
-            .problems = j["problems"]};
-  for (const Json& f : j["fields"]) v.fields.push_back(fieldVerdict(f));
+            .problems = j.at("problems")};
+  for (const Json& f : j.at("fields")) v.fields.push_back(fieldVerdict(f));
   return v;
 }
 
@@ -139,16 +139,16 @@ std::string toJson(const WorkerTask& task) {
 
 WorkerTask workerTask(std::string_view json) try {
   const Json j = parse(json, "task");
-  WorkerTask task{.session = {.root = j["root"].get<std::string>(),
-                              .device = j["device"],
-                              .seed = j["seed"],
-                              .cases = optional<std::size_t>(j["generated"]),
-                              .validation = j["validation"]},
-                  .cases = j["cases"]};
-  if (const auto seconds = optional<long>(j["timeout"]))
+  WorkerTask task{.session = {.root = j.at("root").get<std::string>(),
+                              .device = j.at("device"),
+                              .seed = j.at("seed"),
+                              .cases = optional<std::size_t>(j.at("generated")),
+                              .validation = j.at("validation")},
+                  .cases = j.at("cases")};
+  if (const auto seconds = optional<long>(j.at("timeout")))
     task.session.timeout = std::chrono::seconds(*seconds);
-  if (!j["errors"].is_null()) task.errors = deviceErrors(j["errors"]);
-  for (const auto& [kernel, file] : j["kernels"].items())
+  if (!j.at("errors").is_null()) task.errors = deviceErrors(j.at("errors"));
+  for (const auto& [kernel, file] : j.at("kernels").items())
     task.session.kernels[kernel] = file.get<std::string>();
   return task;
 } catch (const Json::exception& e) {
@@ -174,18 +174,18 @@ std::string toJson(const CaseRecord& r) {
 
 CaseRecord caseRecord(std::string_view json) try {
   const Json j = parse(json, "record");
-  CaseRecord r{.name = j["name"],
-               .kernel = j["kernel"],
-               .failed = j["failed"],
-               .skipped = optional<std::string>(j["skipped"]),
-               .unsupported = optional<std::string>(j["unsupported"]),
-               .threadsCommunicate = j["threadsCommunicate"],
-               .usesSubgroups = j["usesSubgroups"],
-               .elements = j["elements"],
-               .seconds = j["seconds"],
-               .measured = deviceErrors(j["measured"]),
-               .messages = j["messages"]};
-  for (const Json& v : j["verdicts"]) r.verdicts.push_back(verdict(v));
+  CaseRecord r{.name = j.at("name"),
+               .kernel = j.at("kernel"),
+               .failed = j.at("failed"),
+               .skipped = optional<std::string>(j.at("skipped")),
+               .unsupported = optional<std::string>(j.at("unsupported")),
+               .threadsCommunicate = j.at("threadsCommunicate"),
+               .usesSubgroups = j.at("usesSubgroups"),
+               .elements = j.at("elements"),
+               .seconds = j.at("seconds"),
+               .measured = deviceErrors(j.at("measured")),
+               .messages = j.at("messages")};
+  for (const Json& v : j.at("verdicts")) r.verdicts.push_back(verdict(v));
   return r;
 } catch (const Json::exception& e) {
   throw UsageError(fmt::format("this is no record of a worker: {}", e.what()));
@@ -202,11 +202,11 @@ std::string toJson(const Preparation& p) {
 
 Preparation preparation(std::string_view json) try {
   const Json j = parse(json, "preparation");
-  Preparation p{.errors = deviceErrors(j["errors"]), .foreign = j["foreign"]};
-  p.gpu.name = j["name"];
-  p.gpu.driver = j["driver"];
-  p.gpu.api = j["api"];
-  p.gpu.subgroupSize = j["subgroupSize"];
+  Preparation p{.errors = deviceErrors(j.at("errors")), .foreign = j.at("foreign")};
+  p.gpu.name = j.at("name");
+  p.gpu.driver = j.at("driver");
+  p.gpu.api = j.at("api");
+  p.gpu.subgroupSize = j.at("subgroupSize");
   return p;
 } catch (const Json::exception& e) {
   throw UsageError(fmt::format("this is no preparation of a worker: {}", e.what()));

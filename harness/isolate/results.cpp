@@ -37,14 +37,14 @@ void Results::read(const std::string& fingerprint) try {
   while (std::getline(in, line) && !in.eof()) {  // at the end without a newline: cut off
     const Json json = Json::parse(line);
     if (json.contains("fingerprint")) {
-      ours = json["fingerprint"] == fingerprint;
+      ours = json.at("fingerprint") == fingerprint;
       another = !ours;
     } else if (json.contains("finished")) {
       earlier.clear();
       another = false;
       return;
     } else if (ours) {
-      earlier.push_back({json["width"], caseRecord(json["record"].dump())});
+      earlier.push_back({json.at("width"), caseRecord(json.at("record").dump())});
     }
   }
 } catch (const std::exception&) {  // what cannot be read runs again
