@@ -31,7 +31,9 @@ void commitFault(std::string_view name) {
   if (asked("crash", name)) raise(SIGSEGV);
   if (asked("exit", name)) _exit(7);
   if (asked("memory", name)) useAllMemory();
-  while (asked("hang", name)) pause();
+  static bool lost = false;
+  while (lost || asked("hang", name)) pause();
+  lost = losesDevice(name);
 }
 
 bool losesDevice(std::string_view name) { return asked("lose", name); }

@@ -4,7 +4,7 @@
 //   GNOMON_FAULT=hang:NAME    never goes on
 //   GNOMON_FAULT=exit:NAME    exits with status 7
 //   GNOMON_FAULT=memory:NAME  asks for memory until there is none; nothing where no limit is set
-//   GNOMON_FAULT=lose:NAME    goes on as if the case had lost the device
+//   GNOMON_FAULT=lose:NAME    goes on as if the case had lost the device, and hangs at the next one
 // NAME is a case, or a kernel ("brdf/evaluate") whose foreign file is loaded.
 #pragma once
 

@@ -197,7 +197,7 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                       {"cases", k.cases},
                       {"failed", k.failed},
                       {"skipped", k.skipped},
-                      {"waived", waivedOf(k)},
+                      {"waived", k.waived},
                       {"elements", k.elements},
                       {"outside", k.outside},
                       {"ambiguous", k.ambiguous},
@@ -206,7 +206,8 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                       {"seconds", k.seconds},
                       {"unsupported", k.unsupported ? nlohmann::json(*k.unsupported) : nullptr},
                       {"domains", domainsOf(k)},
-                      {"failures", failuresOf(k, options)}});
+                      {"failures", failuresOf(k, options)},
+                      {"waivers", waivedOf(k)}});
   }
   const nlohmann::json json = {{"schema", 1},
                                {"device",
