@@ -6,12 +6,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "harness/cases/hash.h"
 #include "harness/error.h"
 
 namespace gnomon {
 
 void KernelCase::SetUp() {
-  skipWhereUnsupported([&] { Session::current().subject(kernelName); });
+  skipWhereUnsupported([&] {
+    const Subject& subject = Session::current().subject(kernelName);
+    CaseRecord& found = Session::current().currentCase();
+    found.threadsCommunicate = subject.threadsCommunicate();
+    found.usesSubgroups = subject.usesSubgroups();
+  });
 }
 
 void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
@@ -110,11 +116,8 @@ void KernelCase::record(const Bounds& bounds, const Observation& seen, const Exp
 
 std::uint64_t caseSeed() {
   const testing::TestInfo* info = testing::UnitTest::GetInstance()->current_test_info();
-  // FNV-1a, so that a case's inputs do not depend on the standard library's hash.
-  std::uint64_t hash = 14695981039346656037ull ^ Session::current().options().seed;
-  for (const char c : std::string(info->test_suite_name()) + "." + info->name())
-    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return hash;
+  return hashOf(std::string(info->test_suite_name()) + "." + info->name(),
+                kHashBasis ^ Session::current().options().seed);
 }
 
 std::size_t generated(const char* policyName) {

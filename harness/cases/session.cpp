@@ -1,8 +1,10 @@
 #include "harness/cases/session.h"
 
 #include <algorithm>
+#include <fstream>
 #include <stdexcept>
 
+#include "harness/cases/hash.h"
 #include "harness/error.h"
 #include "harness/program/embedded.h"
 
@@ -12,6 +14,11 @@ namespace {
 Session* theSession = nullptr;
 
 }  // namespace
+
+std::chrono::milliseconds caseLimit(const SessionOptions& options, const Policy& policy) {
+  if (options.timeout) return *options.timeout;
+  return std::chrono::milliseconds(static_cast<long>(1000 * policy["caseSeconds"]));
+}
 
 Session::Session(SessionOptions options)
     : settings(std::move(options)), choices(Policy::load(settings.root / "tests/policy.json")) {
@@ -52,6 +59,15 @@ KernelModule Session::load(const KernelRecord& record) const {
   return {.words = SpirvWords(words.begin(), words.end()), .origin = "kernels/" + record.file};
 }
 
+std::uint64_t Session::foreignHash(const std::string& kernel) const {
+  const std::filesystem::path& file = settings.kernels.at(kernel);
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const SpirvWords words = load(findKernel(kernel)).words;
+  return hashOf({reinterpret_cast<const char*>(words.data()), words.size() * sizeof(words[0])},
+                hashOf(text));
+}
+
 const Bounds& Session::bounds() {
   if (!rules) {
     rules = Bounds::specification(gpu().info().roundingRteFloat32);
@@ -72,14 +88,11 @@ void Session::measured(Operation operation, const MeasuredError& error) {
   if (settings.cases || foreign) return;
   deviceErrors();
   merge(*errors, operation, error);
-  measuredAny = true;
+  currentCase().measured[operation] = error;
   rules.reset();
 }
 
-std::chrono::milliseconds Session::limit() const {
-  if (settings.timeout) return *settings.timeout;
-  return std::chrono::milliseconds(static_cast<long>(1000 * choices["caseSeconds"]));
-}
+std::chrono::milliseconds Session::limit() const { return caseLimit(settings, choices); }
 
 void Session::beginCase(std::string name, std::string kernel) {
   records.push_back({.name = std::move(name), .kernel = std::move(kernel)});
@@ -88,14 +101,6 @@ void Session::beginCase(std::string name, std::string kernel) {
 CaseRecord& Session::currentCase() {
   if (records.empty()) throw std::logic_error("no case has begun");
   return records.back();
-}
-
-const CaseRecord& Session::addFailure(const std::string& caseName, std::string message) {
-  const auto found = std::ranges::find(records, caseName, &CaseRecord::name);
-  if (found == records.end()) throw std::logic_error("no case has run as " + caseName);
-  found->failed = true;
-  found->messages.push_back(std::move(message));
-  return *found;
 }
 
 }  // namespace gnomon

@@ -1,9 +1,10 @@
-// One run of the command: the device, the kernels under test, and what every case has found so far.
+// Where cases run: the device, the kernels under test, and what every case has found so far.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -22,10 +23,13 @@ struct SessionOptions {
   std::string device{};          ///< as Gpu::Options::device
   std::uint64_t seed = 1;
   std::optional<std::size_t> cases{};  ///< generated inputs a case, instead of the policy's number
-  std::optional<std::chrono::seconds> timeout{};  ///< a wait, instead of the policy's number
+  std::optional<std::chrono::seconds> timeout{};  ///< a case, instead of the policy's number
   std::map<std::string, std::filesystem::path> kernels{};  ///< replaced: "stage/entry" -> file
   bool validation = true;  ///< Vulkan's validation layer; off for timing only
 };
+
+/// The longest time that a case may take.
+std::chrono::milliseconds caseLimit(const SessionOptions& options, const Policy& policy);
 
 /// What one case has found.
 struct CaseRecord {
@@ -34,9 +38,13 @@ struct CaseRecord {
   bool failed = false;
   std::optional<std::string> skipped{};      ///< why
   std::optional<std::string> unsupported{};  ///< what the device lacks
-  std::size_t elements = 0;                  ///< checked, by a verdict or by a law
+  std::optional<std::string> waived{};       ///< why its failure is excused
+  bool threadsCommunicate = false;           ///< in its kernel, as Subject says
+  bool usesSubgroups = false;
+  std::size_t elements = 0;  ///< checked, by a verdict or by a law
   double seconds = 0;
   std::vector<Verdict> verdicts{};
+  DeviceErrors measured{};              ///< of the device, by this case
   std::vector<std::string> messages{};  ///< one for each failure
 };
 
@@ -57,6 +65,9 @@ class Session {
   /// Unsupported, UsageError, DeviceError.
   const Subject& subject(const std::string& kernel);
 
+  /// Changes with what a kernel of the user's comes to, by its file or what that includes.
+  std::uint64_t foreignHash(const std::string& kernel) const;
+
   /// The rules of this device: what the specification allows, and what was measured if it was.
   const Bounds& bounds();
 
@@ -64,16 +75,25 @@ class Session {
   void measured(Operation operation, const MeasuredError& error);
   /// What is known of this device: measured before, and by this run.
   const DeviceErrors& deviceErrors();
-  bool hasMeasured() const { return measuredAny; }
+  /// Takes this for known, and reads no file.
+  void know(DeviceErrors known) { errors = std::move(known); }
 
-  /// Time limit of one wait for the device.
+  /// A case went beyond what a device can do in time, or the device did: whoever goes on needs
+  /// another one.
+  bool deviceLost() const { return device && !device->alive(); }
+
+  /// Called by a case that takes long, whenever it has come further: its time starts again.
+  void cameFurther() const {
+    if (onProgress) onProgress();
+  }
+  std::function<void()> onProgress{};
+
+  /// Time limit of a case, and of one wait for the device in it.
   std::chrono::milliseconds limit() const;
 
   void beginCase(std::string name, std::string kernel);
   CaseRecord& currentCase();
   const std::vector<CaseRecord>& cases() const { return records; }
-  /// A case that has ended failed after all, when it ran again elsewhere.
-  const CaseRecord& addFailure(const std::string& caseName, std::string message);
 
  private:
   KernelModule load(const KernelRecord& record) const;
@@ -83,7 +103,6 @@ class Session {
   std::unique_ptr<Gpu> device;
   std::optional<Bounds> rules;
   std::optional<DeviceErrors> errors;
-  bool measuredAny = false;
   std::map<std::string, std::unique_ptr<Subject>> subjects;
   std::vector<CaseRecord> records;
 };

@@ -40,7 +40,8 @@ struct ValidateOptions {
   std::string json;
   std::filesystem::path out;  ///< folder for what each case found
   std::filesystem::path junit;
-  bool require = false;  ///< unsupported and skipped cases are failures
+  bool require = false;            ///< unsupported and skipped cases are failures
+  std::optional<unsigned> jobs{};  ///< workers at a time
 };
 int validate(const ValidateOptions& options);
 

@@ -18,6 +18,10 @@ constexpr const char* kExit =
     "Exit status: 0 all good; 1 a kernel, a frame or a baseline is wrong; 2 usage or bad input "
     "file; 3 no usable device.";
 
+constexpr const char* kJobs =
+    "Worker processes at a time (default: one a core, at most 8: a case mostly uses one, and half "
+    "a GiB)";
+
 /// "S/E=FILE", repeatable.
 void addKernelOption(CLI::App& command, SessionOptions& session) {
   command
@@ -45,7 +49,7 @@ void addSessionOptions(CLI::App& command, SessionOptions& session, std::string& 
   command
       .add_option_function<unsigned>(
           "--timeout", [&session](unsigned s) { session.timeout = std::chrono::seconds(s); },
-          "Seconds that one wait for the device may take (default: 60)")
+          "Seconds that a case may take, or one wait for the device (default: 60)")
       ->check(CLI::PositiveNumber);
   command.add_option("--json", json, "Write results as JSON to FILE, or - for standard output")
       ->type_name("FILE");
@@ -105,9 +109,14 @@ void addValidate(CLI::App& app, Action& action) {
       ->add_option("--filter", o->selection.filter,
                    "Only cases whose name (see `list cases`) matches the shell pattern")
       ->type_name("GLOB");
-  command->add_option("--out", o->out, "Write what each case found into DIR")->type_name("DIR");
+  command
+      ->add_option("--out", o->out,
+                   "Write what each case found into DIR, as it comes; after a run that was killed "
+                   "the same command goes on where it was")
+      ->type_name("DIR");
   command->add_option("--junit", o->junit, "Write JUnit XML to FILE")->type_name("FILE");
   addShard(*command, o->selection);
+  command->add_option("--jobs", o->jobs, kJobs)->check(CLI::PositiveNumber)->type_name("N");
   command->add_flag("--require", o->require, "Unsupported or skipped cases are failures");
   addSessionOptions(*command, o->session, o->json);
   command->footer(kExit);

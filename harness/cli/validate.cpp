@@ -1,23 +1,20 @@
-#include <fmt/format.h>
+#include <fstream>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "harness/cases/hash.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/run.h"
 #include "harness/error.h"
-#include "harness/isolate/sweep.h"
+#include "harness/isolate/worker.h"
 #include "harness/report/summary.h"
 #include "harness/report/terminal.h"
+#include "harness/verdict/waivers.h"
 
 namespace gnomon {
 namespace {
-
-/// A mistake in --kernel is the user's, so it is found before the first case.
-void loadForeignKernels(Session& session) {
-  for (const auto& [kernel, file] : session.options().kernels) {
-    try {
-      session.subject(kernel);
-    } catch (const Unsupported&) {  // the case will say so
-    }
-  }
-}
 
 std::string failureText(const Terminal& terminal, const CaseRecord& record,
                         const SessionOptions& options) {
@@ -32,37 +29,79 @@ std::string failureText(const Terminal& terminal, const CaseRecord& record,
   return text + "reproduce: " + reproduceCommand(record.name, options) + "\n";
 }
 
-Observer observerFor(Terminal& terminal, const SessionOptions& options) {
-  return {.begin =
-              [&terminal](const CaseName& c, std::size_t index, std::size_t count) {
-                terminal.progress(fmt::format("[{}/{}] {}", index + 1, count, c.name));
+/// A line of how far the run is and what runs now.
+std::string progressText(std::size_t ended, std::size_t all, unsigned lanes,
+                         const std::vector<std::string>& running) {
+  const std::string again = lanes == 0 ? "" : fmt::format("in subgroups of {}: ", lanes);
+  return fmt::format("[{}/{}] {}{}", ended, all, again, fmt::join(running, ", "));
+}
+
+const char* outcome(const CaseRecord& r) {
+  return r.failed ? "failed" : r.waived ? "waived" : "passed";
+}
+
+/// The waivers of this run's device. They excuse drivers, never a kernel of the user's.
+class Court {
+ public:
+  Court(std::vector<Waiver> w, const GpuInfo& g, const SessionOptions& s)
+      : waivers(std::move(w)), gpu(g), session(s) {}
+
+  const Waiver* waiver(const CaseRecord& r) const {
+    const bool ran = !r.skipped && !r.unsupported;
+    return ran && !session.kernels.contains(r.kernel)
+               ? waiverFor(waivers, gpu.name, gpu.driver, r.name)
+               : nullptr;
+  }
+
+  /// What the records say once their waivers are taken into account.
+  std::vector<CaseRecord> judged(std::vector<CaseRecord> records) const {
+    for (CaseRecord& r : records) {
+      const Waiver* w = waiver(r);
+      if (w == nullptr) continue;
+      const Ruling ruling = rule(*w, r.failed, today());
+      r.failed = ruling.failed;
+      r.waived = ruling.waived;
+      // In front: the first message is the one that a terminal shows.
+      if (ruling.message) r.messages.insert(r.messages.begin(), *ruling.message);
+    }
+    return records;
+  }
+
+ private:
+  std::vector<Waiver> waivers;
+  const GpuInfo& gpu;
+  const SessionOptions& session;
+};
+
+/// Failures as they come, but for cases with a waiver: those are told of when all has run.
+RunObserver observerFor(Terminal& terminal, const Court& court, const SessionOptions& options) {
+  return {.progress =
+              [&terminal](std::size_t ended, std::size_t all, unsigned lanes,
+                          const std::vector<std::string>& running) {
+                terminal.progress(progressText(ended, all, lanes, running));
               },
-          .end =
-              [&terminal, &options](const CaseRecord& record) {
-                if (record.failed) terminal.print(failureText(terminal, record, options));
+          .ended =
+              [&](const CaseRecord& record) {
+                if (record.failed && court.waiver(record) == nullptr)
+                  terminal.print(failureText(terminal, record, options));
               }};
 }
 
-SweepObserver sweepObserver(Terminal& terminal, const SessionOptions& options) {
-  return {.begin =
-              [&terminal](unsigned subgroupSize, std::size_t cases) {
-                terminal.progress(
-                    fmt::format("{} cases again in subgroups of {}", cases, subgroupSize));
-              },
-          .failed =
-              [&terminal, &options](const CaseRecord& record) {
-                terminal.print(failureText(terminal, record, options));
-              }};
+void tellOfWaivers(Terminal& terminal, const Court& court, const std::vector<CaseRecord>& records,
+                   const SessionOptions& options) {
+  for (const CaseRecord& r : records) {
+    if (r.waived)
+      terminal.print(fmt::format("{} {} ({}): {}", terminal.paint(Colour::kYellow, "waived"),
+                                 r.name, r.kernel, *r.waived));
+    if (r.failed && court.waiver(r) != nullptr) terminal.print(failureText(terminal, r, options));
+  }
 }
 
 /// What each case found, and the device's measured errors where this run measured them.
-void writeFindings(const std::filesystem::path& folder, Session& session, const GpuInfo& gpu) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw UsageError(fmt::format("--out {}: {}", folder.string(), error.message()));
-  for (const CaseRecord& r : session.cases()) {
-    std::string text =
-        fmt::format("{} ({}): {}\n", r.name, r.kernel, r.failed ? "failed" : "passed");
+void writeFindings(const std::filesystem::path& folder, const std::vector<CaseRecord>& records,
+                   const Run& run, const GpuInfo& gpu) {
+  for (const CaseRecord& r : records) {
+    std::string text = fmt::format("{} ({}): {}\n", r.name, r.kernel, outcome(r));
     for (const Verdict& v : r.verdicts)
       for (const FieldVerdict& f : v.fields)
         text += fmt::format(
@@ -72,8 +111,8 @@ void writeFindings(const std::filesystem::path& folder, Session& session, const 
     for (const std::string& m : r.messages) text += "\n" + m;
     writeText(folder / (r.name + ".txt"), text);
   }
-  if (session.hasMeasured())
-    writeText(folder / (deviceKey(gpu) + ".json"), deviceErrorsJson(gpu, session.deviceErrors()));
+  if (run.hasMeasured())
+    writeText(folder / (deviceKey(gpu) + ".json"), deviceErrorsJson(gpu, run.deviceErrors()));
 }
 
 int status(const std::vector<KernelSummary>& kernels, bool require) {
@@ -84,6 +123,56 @@ int status(const std::vector<KernelSummary>& kernels, bool require) {
   return kGood;
 }
 
+std::string contentOf(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Everything that a result depends on. Two runs with the same one may share results.
+std::string fingerprint(const ValidateOptions& o, const Preparation& prepared) {
+  const SessionOptions& s = o.session;
+  return nlohmann::json{{"stages", o.selection.stages},
+                        {"filter", o.selection.filter},
+                        {"shard", {o.selection.shard, o.selection.shards}},
+                        {"seed", s.seed},
+                        {"cases", s.cases.value_or(0)},
+                        {"timeout", s.timeout ? s.timeout->count() : 0},
+                        {"prepared", toJson(prepared)},
+                        {"policy", hashOf(contentOf(s.root / "tests/policy.json"))},
+                        {"executable", hashOf(contentOf(thisExecutable()))}}
+      .dump();
+}
+
+std::optional<Results> openResults(const ValidateOptions& options, const Preparation& prepared,
+                                   Terminal& terminal) {
+  if (options.out.empty()) return std::nullopt;
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw UsageError(fmt::format("--out {}: {}", options.out.string(), error.message()));
+  std::optional<Results> results(std::in_place, options.out / "results.jsonl",
+                                 fingerprint(options, prepared));
+  if (results->replacesAnother())
+    terminal.print(
+        fmt::format("{}/results.jsonl was of another run: starting afresh", options.out.string()));
+  return results;
+}
+
+/// The files asked for and the table; the command's exit status.
+int report(const ValidateOptions& options, Terminal& terminal,
+           const std::vector<KernelSummary>& kernels, const GpuInfo& gpu) {
+  if (!options.junit.empty()) writeText(options.junit, summaryJunit(kernels));
+  if (!options.json.empty()) writeText(options.json, summaryJson(kernels, options.session, gpu));
+  terminal.print(summaryTable(kernels, terminal));
+  for (const KernelSummary& k : kernels) {
+    if (k.unsupported)
+      terminal.print(fmt::format("{} is unsupported here: {}", k.kernel, *k.unsupported));
+    if (!k.unmapped.empty())
+      terminal.print(fmt::format("{}: {} of its outputs are not given, and not judged: {}",
+                                 k.kernel, k.unmapped.size(), fmt::join(k.unmapped, ", ")));
+  }
+  return status(kernels, options.require);
+}
+
 }  // namespace
 
 int validate(const ValidateOptions& given) {
@@ -91,26 +180,40 @@ int validate(const ValidateOptions& given) {
   options.session.root = sourceRoot();
   for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
   const std::vector<CaseName> cases = selectCases(options.selection);
-  Session session(options.session);
-  const GpuInfo gpu = session.gpu().info();
+  const Policy policy = Policy::load(options.session.root / "tests/policy.json");
+  std::vector<Waiver> waivers = loadWaivers(options.session.root / "tests/waivers.json");
   Terminal terminal(options.json == "-" ? stderr : stdout);
+
+  const Preparation prepared = prepare(options.session, policy);
+  const GpuInfo& gpu = prepared.gpu;
   terminal.print(fmt::format("{}, {}, Vulkan {}, seed {}", gpu.name, gpu.driver, gpu.api,
                              options.session.seed));
-  loadForeignKernels(session);
-  session.bounds();  // a file of measured errors that cannot be read is no kernel's fault
-  runCases(session, cases, observerFor(terminal, options.session));
-  sweepWidths(session, sweepObserver(terminal, options.session));
-
-  const std::vector<KernelSummary> kernels = summarise(session.cases());
-  if (!options.out.empty()) writeFindings(options.out, session, gpu);
-  if (session.hasMeasured()) cacheDeviceErrors(gpu, session.deviceErrors());
-  if (!options.junit.empty()) writeText(options.junit, summaryJunit(kernels));
-  if (!options.json.empty()) writeText(options.json, summaryJson(kernels, session, gpu));
-  terminal.print(summaryTable(kernels, terminal));
-  for (const KernelSummary& k : kernels)
-    if (k.unsupported)
-      terminal.print(fmt::format("{} is unsupported here: {}", k.kernel, *k.unsupported));
-  return status(kernels, options.require);
+  const Court court(std::move(waivers), gpu, options.session);
+  std::optional<Results> results = openResults(options, prepared, terminal);
+  Run run({.session = options.session,
+           .policy = policy,
+           .prepared = prepared,
+           .jobs = options.jobs.value_or(defaultJobs()),
+           .results = results ? &*results : nullptr,
+           .observer = observerFor(terminal, court, options.session)},
+          cases);
+  if (run.takenFromFile() > 0)
+    terminal.print(
+        fmt::format("{} of {} cases are taken from {}/results.jsonl, where the last run "
+                    "was interrupted",
+                    run.takenFromFile(), cases.size(), options.out.string()));
+  run.judge();
+  const std::vector<CaseRecord> records = court.judged(run.records());
+  tellOfWaivers(terminal, court, records, options.session);
+  if (results) writeFindings(options.out, records, run, gpu);
+  if (run.hasMeasured()) cacheDeviceErrors(gpu, run.deviceErrors());
+  std::vector<KernelSummary> kernels = summarise(records);
+  for (KernelSummary& k : kernels)
+    if (const auto found = prepared.unmapped.find(k.kernel); found != prepared.unmapped.end())
+      k.unmapped = found->second;
+  const int verdict = report(options, terminal, kernels, gpu);
+  if (results) results->finish();
+  return verdict;
 }
 
 }  // namespace gnomon

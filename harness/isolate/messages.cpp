@@ -48,6 +48,28 @@ FieldVerdict fieldVerdict(const Json& j) {
           .worst = {}};
 }
 
+Json errorsJson(const DeviceErrors& errors) {
+  Json j = Json::object();
+  for (const auto& [operation, e] : errors)
+    j[std::string(nameOf(operation))] = {{"ulp", number(e.worst.ulp)},
+                                         {"absolute", number(e.worst.absolute)},
+                                         {"worstAt", number(e.worstAt)},
+                                         {"arguments", e.arguments},
+                                         {"exhaustive", e.exhaustive}};
+  return j;
+}
+
+DeviceErrors deviceErrors(const Json& j) {
+  DeviceErrors errors;
+  for (const auto& [name, e] : j.items())
+    if (const auto operation = operationNamed(name))
+      errors[*operation] = {.worst = {number(e.at("ulp")), number(e.at("absolute"))},
+                            .worstAt = number(e.at("worstAt")),
+                            .arguments = e.at("arguments"),
+                            .exhaustive = e.at("exhaustive")};
+  return errors;
+}
+
 Json verdictJson(const Verdict& v) {
   Json j = {{"class", static_cast<int>(v.verdict)},
             {"widening", v.widening},
@@ -111,7 +133,8 @@ std::string toJson(const WorkerTask& task) {
                {"timeout", s.timeout ? Json(s.timeout->count()) : Json(nullptr)},
                {"kernels", kernels},
                {"validation", s.validation},
-               {"cases", task.cases}});
+               {"cases", task.cases},
+               {"errors", task.errors ? errorsJson(*task.errors) : Json(nullptr)}});
 }
 
 WorkerTask workerTask(std::string_view json) try {
@@ -124,6 +147,7 @@ WorkerTask workerTask(std::string_view json) try {
                   .cases = j.at("cases")};
   if (const auto seconds = optional<long>(j.at("timeout")))
     task.session.timeout = std::chrono::seconds(*seconds);
+  if (!j.at("errors").is_null()) task.errors = deviceErrors(j.at("errors"));
   for (const auto& [kernel, file] : j.at("kernels").items())
     task.session.kernels[kernel] = file.get<std::string>();
   return task;
@@ -137,9 +161,12 @@ std::string toJson(const CaseRecord& r) {
             {"failed", r.failed},
             {"skipped", optional(r.skipped)},
             {"unsupported", optional(r.unsupported)},
+            {"threadsCommunicate", r.threadsCommunicate},
+            {"usesSubgroups", r.usesSubgroups},
             {"elements", r.elements},
             {"seconds", r.seconds},
             {"verdicts", Json::array()},
+            {"measured", errorsJson(r.measured)},
             {"messages", r.messages}};
   for (const Verdict& v : r.verdicts) j["verdicts"].push_back(verdictJson(v));
   return text(j);
@@ -152,13 +179,40 @@ CaseRecord caseRecord(std::string_view json) try {
                .failed = j.at("failed"),
                .skipped = optional<std::string>(j.at("skipped")),
                .unsupported = optional<std::string>(j.at("unsupported")),
+               .threadsCommunicate = j.at("threadsCommunicate"),
+               .usesSubgroups = j.at("usesSubgroups"),
                .elements = j.at("elements"),
                .seconds = j.at("seconds"),
+               .measured = deviceErrors(j.at("measured")),
                .messages = j.at("messages")};
   for (const Json& v : j.at("verdicts")) r.verdicts.push_back(verdict(v));
   return r;
 } catch (const Json::exception& e) {
   throw UsageError(fmt::format("this is no record of a worker: {}", e.what()));
+}
+
+std::string toJson(const Preparation& p) {
+  return text({{"name", p.gpu.name},
+               {"driver", p.gpu.driver},
+               {"api", p.gpu.api},
+               {"subgroupSize", p.gpu.subgroupSize},
+               {"errors", errorsJson(p.errors)},
+               {"foreign", p.foreign},
+               {"unmapped", p.unmapped}});
+}
+
+Preparation preparation(std::string_view json) try {
+  const Json j = parse(json, "preparation");
+  Preparation p{.errors = deviceErrors(j.at("errors")),
+                .foreign = j.at("foreign"),
+                .unmapped = j.at("unmapped")};
+  p.gpu.name = j.at("name");
+  p.gpu.driver = j.at("driver");
+  p.gpu.api = j.at("api");
+  p.gpu.subgroupSize = j.at("subgroupSize");
+  return p;
+} catch (const Json::exception& e) {
+  throw UsageError(fmt::format("this is no preparation of a worker: {}", e.what()));
 }
 
 }  // namespace gnomon

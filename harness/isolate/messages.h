@@ -1,6 +1,8 @@
 // What a worker and its parent tell each other, as JSON.
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +14,16 @@ namespace gnomon {
 /// What a worker is to run.
 struct WorkerTask {
   SessionOptions session{};
-  std::vector<std::string> cases{};  ///< by name, in this order
+  std::vector<std::string> cases{};      ///< by name, in this order; none: to prepare only
+  std::optional<DeviceErrors> errors{};  ///< of the device; none: as a file says
+};
+
+/// What a worker without cases has found: the device, and that the foreign kernels can be loaded.
+struct Preparation {
+  GpuInfo gpu{};                                   ///< name, driver, api and subgroupSize alone
+  DeviceErrors errors{};                           ///< known before this run
+  std::map<std::string, std::uint64_t> foreign{};  ///< Session::foreignHash
+  std::map<std::string, std::vector<std::string>> unmapped{};  ///< Interface::unmapped, of foreign
 };
 
 std::string toJson(const WorkerTask& task);
@@ -22,5 +33,8 @@ WorkerTask workerTask(std::string_view json);
 /// A whole record but for each verdict's worst elements, which its messages name.
 std::string toJson(const CaseRecord& record);
 CaseRecord caseRecord(std::string_view json);
+
+std::string toJson(const Preparation& preparation);
+Preparation preparation(std::string_view json);
 
 }  // namespace gnomon

@@ -239,7 +239,7 @@ class Child {
   ~Child();
 
   void start(const std::filesystem::path& executable, const ProcessOptions& options);
-  bool readUntilEnd(Clock::time_point deadline);
+  bool readUntilEnd(const std::function<Clock::time_point()>& deadline);
   void readRest(Clock::time_point deadline);
   bool reap(siginfo_t& info);
 
@@ -323,10 +323,10 @@ bool Child::wait(int processOrNone, Clock::time_point deadline) {
   return ready[0].revents != 0;
 }
 
-/// Whether the child has ended before the deadline.
-bool Child::readUntilEnd(Clock::time_point deadline) {
-  while (!wait(process.get(), deadline))
-    if (Clock::now() >= deadline) return false;
+/// Whether the child has ended before the deadline, which may move with what the child says.
+bool Child::readUntilEnd(const std::function<Clock::time_point()>& deadline) {
+  while (!wait(process.get(), deadline()))
+    if (Clock::now() >= deadline()) return false;
   return true;
 }
 
@@ -358,13 +358,15 @@ ProcessResult runProcess(const std::filesystem::path& executable, const ProcessO
   Child child(options);
   child.start(executable, options);
 
-  const bool timedOut = !child.readUntilEnd(start + options.limit);
+  const auto at = [](Clock::time_point deadline) { return [deadline] { return deadline; }; };
+  const bool timedOut =
+      !child.readUntilEnd(options.until ? options.until : at(start + options.limit));
   if (timedOut) {
     child.signal(SIGTERM);
     child.signal(SIGCONT);  // a stopped process would not see the other
-    if (!child.readUntilEnd(Clock::now() + kGrace)) {
+    if (!child.readUntilEnd(at(Clock::now() + kGrace))) {
       child.signal(SIGKILL);
-      child.readUntilEnd(Clock::now() + kGiveUp);
+      child.readUntilEnd(at(Clock::now() + kGiveUp));
     }
   }
   ProcessResult result;

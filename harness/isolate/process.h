@@ -21,6 +21,10 @@ struct ProcessOptions {
   /// From the start to the end of the child. Then it gets SIGTERM, and a second later SIGKILL.
   std::chrono::milliseconds limit{60'000};
 
+  /// In place of the limit: until when the child may go on, asked again whenever it has said
+  /// something. For a child that does one thing after another, each with a limit of its own.
+  std::function<std::chrono::steady_clock::time_point()> until{};
+
   /// Private writable memory of the child, 0: unlimited. An allocation past it fails. This is
   /// RLIMIT_DATA, not RLIMIT_AS: LLVM and drivers reserve far more addresses than they ever use,
   /// and a limit on those would kill the innocent. It holds for each process alone, does not see

@@ -1,35 +1,56 @@
 #include "harness/isolate/worker.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstdlib>
+#include <new>
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include "harness/cases/runner.h"
 #include "harness/error.h"
-#include "harness/isolate/process.h"
+#include "harness/isolate/fault.h"
 
 namespace gnomon {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 // A driver may print too: lines of ours begin so.
+constexpr std::string_view kLoading = "@loading ";
+constexpr std::string_view kPrepared = "@prepared ";
 constexpr std::string_view kBegun = "@begun ";
+constexpr std::string_view kFurther = "@further ";
 constexpr std::string_view kEnded = "@ended ";
 
+constexpr int kUsageStatus = 2, kDeviceStatus = 3;  // of the command
+
+// ---- in the worker --------------------------------------------------------------------------
+
+/// On a line of its own, whatever a driver has left on this one.
 void say(std::string_view what, const std::string& text) {
-  fmt::print("{}{}\n", what, text);
+  fmt::print("\n{}{}\n", what, text);
   std::fflush(stdout);  // what a crash would take along
 }
 
-std::string lastLines(const std::string& text) {
-  constexpr std::size_t kEnough = 600;
-  return text.size() <= kEnough ? text : "..." + text.substr(text.size() - kEnough);
-}
-
-std::string deathOf(const ProcessResult& end) {
-  std::string why = end.inWords();
-  if (!end.errors.empty()) why += "; it said last:\n" + lastLines(end.errors);
-  return why;
+/// Who cannot get memory dies at once and says why: what is left would only fail strangely.
+void dieWithoutMemory() {
+  rlimit limit{};
+  getrlimit(RLIMIT_DATA, &limit);
+  std::array<char, 128> text{};
+  const int length = limit.rlim_cur == RLIM_INFINITY
+                         ? std::snprintf(text.data(), text.size(), "gnomon: out of memory\n")
+                         : std::snprintf(text.data(), text.size(),
+                                         "gnomon: out of memory, of which it has %g GiB\n",
+                                         static_cast<double>(limit.rlim_cur) / (1 << 30));
+  [[maybe_unused]] const auto written =
+      write(STDERR_FILENO, text.data(), static_cast<std::size_t>(length));
+  _exit(1);
 }
 
 std::vector<CaseName> namedCases(const std::vector<std::string>& names) {
@@ -41,31 +62,167 @@ std::vector<CaseName> namedCases(const std::vector<std::string>& names) {
   return chosen;
 }
 
+/// A mistake in --kernel is the user's, so it is found before the first case.
+void loadForeignKernels(Session& session, Preparation& found) {
+  for (const auto& [kernel, file] : session.options().kernels) {
+    say(kLoading, file.string());
+    commitFault(kernel);
+    try {
+      found.unmapped[kernel] = session.subject(kernel).interface().unmapped;
+    } catch (const Unsupported&) {  // the case will say so
+    }
+    found.foreign[kernel] = session.foreignHash(kernel);
+  }
+}
+
+void prepareHere(Session& session) {
+  Preparation found;
+  found.gpu = session.gpu().info();
+  loadForeignKernels(session, found);
+  session.bounds();  // a file of measured errors that cannot be read is no kernel's fault
+  found.errors = session.deviceErrors();
+  say(kPrepared, toJson(found));
+}
+
+void begin(const std::string& name) {
+  say(kBegun, name);
+  commitFault(name);
+  if (losesDevice(name)) ADD_FAILURE() << "VK_ERROR_DEVICE_LOST, as GNOMON_FAULT asks";
+}
+
+void end(const Session& session, const CaseRecord& record) {
+  say(kEnded, toJson(record));
+  // Without destructors: those of a device that hangs may wait for it.
+  if (session.deviceLost() || losesDevice(record.name)) _exit(0);
+}
+
 }  // namespace
 
 void serve(const WorkerTask& task) {
+  std::set_new_handler(dieWithoutMemory);
   const std::vector<CaseName> cases = namedCases(task.cases);
   Session session(task.session);
+  if (task.errors) session.know(*task.errors);
+  if (cases.empty()) return prepareHere(session);
+  session.onProgress = [] { say(kFurther, ""); };
   runCases(session, cases,
-           {.begin = [](const CaseName& c, std::size_t, std::size_t) { say(kBegun, c.name); },
-            .end = [](const CaseRecord& r) { say(kEnded, toJson(r)); }});
+           {.begin = [](const CaseName& c, std::size_t, std::size_t) { begin(c.name); },
+            .end = [&](const CaseRecord& r) { end(session, r); }});
+}
+
+// ---- in the parent --------------------------------------------------------------------------
+
+namespace {
+
+/// Follows what a worker says, and until when its present step may take.
+class Listener {
+ public:
+  explicit Listener(const WorkerOptions& o) : options(o) { startAgain(); }
+
+  void hear(std::string_view line) try {
+    if (take(line, kLoading)) report.running = line;
+    if (take(line, kPrepared)) report.preparation = preparation(line);
+    if (take(line, kBegun)) beginCase(std::string(line));
+    if (take(line, kFurther)) startAgain();
+    if (take(line, kEnded)) endCase(caseRecord(line));
+  } catch (const UsageError&) {  // it lost its mind: what it does not say well, it has not said
+  }
+
+  Clock::time_point until() const { return deadline; }
+  WorkerReport report{};
+
+ private:
+  static bool take(std::string_view& line, std::string_view word) {
+    if (!line.starts_with(word)) return false;
+    line.remove_prefix(word.size());
+    return true;
+  }
+
+  void startAgain() { deadline = Clock::now() + options.limit + kGrace; }
+
+  void beginCase(std::string name) {
+    startAgain();
+    report.running = std::move(name);
+    if (options.begun) options.begun(report.running);
+  }
+
+  void endCase(CaseRecord record) {
+    startAgain();
+    report.running.clear();
+    ++report.ended;
+    if (options.ended) options.ended(std::move(record));
+  }
+
+  const WorkerOptions& options;
+  Clock::time_point deadline{};
+};
+
+std::string lastLines(const std::string& text) {
+  constexpr std::size_t kEnough = 600;
+  return text.size() <= kEnough ? text : "..." + text.substr(text.size() - kEnough);
+}
+
+/// What the command printed before it exited.
+std::string complaint(const ProcessResult& end) {
+  constexpr std::string_view kName = "gnomon: ";
+  const std::size_t at = end.errors.find(kName);
+  std::string text = end.errors.substr(at == std::string::npos ? 0 : at + kName.size());
+  while (text.ends_with('\n')) text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+std::string WorkerReport::death(const WorkerOptions& options) const {
+  if (process.end == ProcessResult::End::kTimedOut)
+    return fmt::format("did not end within {:g} s (and {} s of grace) and {}",
+                       std::chrono::duration<double>(options.limit).count(), kGrace.count(),
+                       process.status == 0 ? "was stopped" : "could not be stopped");
+  std::string why = process.inWords();
+  if (!process.errors.empty()) why += "; it said last:\n" + lastLines(process.errors);
+  return why;
 }
 
 WorkerReport runWorker(const WorkerTask& task, const WorkerOptions& options) {
-  WorkerReport report;
-  const auto listen = [&](std::string_view line) {
-    if (line.starts_with(kBegun)) report.running = line.substr(kBegun.size());
-    if (!line.starts_with(kEnded)) return;
-    report.records.push_back(caseRecord(line.substr(kEnded.size())));
-    report.running.clear();
-    if (options.ended) options.ended(report.records.back());
-  };
-  const ProcessResult end = runProcess(thisExecutable(), {.arguments = {"worker", toJson(task)},
-                                                          .environment = options.environment,
-                                                          .limit = options.limit,
-                                                          .onLine = listen});
-  if (!end.succeeded() || report.records.size() != task.cases.size()) report.death = deathOf(end);
-  return report;
+  // A record may quote many messages: one line, but more than a page.
+  constexpr std::size_t kLongestLine = std::size_t{64} << 20;
+  Listener listener(options);
+  ProcessResult end =
+      runProcess(thisExecutable(), {.arguments = {"worker", toJson(task)},
+                                    .environment = options.environment,
+                                    .until = [&] { return listener.until(); },
+                                    .memoryBytes = options.memoryBytes,
+                                    .maxOutputBytes = kLongestLine,
+                                    .onLine = [&](std::string_view line) { listener.hear(line); }});
+  listener.report.process = std::move(end);
+  return std::move(listener.report);
+}
+
+void throwWhatItExitedWith(const WorkerReport& report) {
+  const ProcessResult& end = report.process;
+  if (end.end != ProcessResult::End::kExited) return;
+  if (end.status == kUsageStatus) throw UsageError(complaint(end));
+  if (end.status == kDeviceStatus) throw DeviceError(complaint(end));
+}
+
+std::uint64_t memoryLimit([[maybe_unused]] const Policy& policy,
+                          [[maybe_unused]] const char* name) {
+#ifdef GNOMON_SANITIZE
+  return 0;
+#else
+  return static_cast<std::uint64_t>(policy[name] * (std::uint64_t{1} << 30));
+#endif
+}
+
+Preparation prepare(const SessionOptions& session, const Policy& policy) {
+  WorkerOptions options{.limit = caseLimit(session, policy)};
+  if (!session.kernels.empty()) options.memoryBytes = memoryLimit(policy, "compileGibibytes");
+  const WorkerReport report = runWorker({.session = session}, options);
+  if (report.preparation && report.process.succeeded()) return *report.preparation;
+  throwWhatItExitedWith(report);
+  if (report.running.empty())
+    throw DeviceError("the worker that opened the device " + report.death(options));
+  throw UsageError(report.running + ": the worker that compiled it " + report.death(options));
 }
 
 }  // namespace gnomon

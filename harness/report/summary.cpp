@@ -17,6 +17,7 @@ void add(KernelSummary& sum, const CaseRecord& record) {
   sum.cases += 1;
   sum.failed += record.failed;
   sum.skipped += record.skipped || record.unsupported;
+  sum.waived += record.waived.has_value();
   sum.elements += record.elements;
   sum.seconds += record.seconds;
   if (record.unsupported) sum.unsupported = record.unsupported;
@@ -24,6 +25,7 @@ void add(KernelSummary& sum, const CaseRecord& record) {
     sum.outside += v.outside;
     sum.ambiguous += v.ambiguous;
     sum.reassociated += v.reassociated;
+    if (record.waived) continue;  // the driver's fault is not the kernel's class
     sum.verdict = std::max(sum.verdict, v.verdict);
     sum.widening = std::max(sum.widening, v.widening);
     // Half of what a narrow format stores is an end of its interval, which says nothing.
@@ -47,6 +49,14 @@ std::string budgetText(const KernelSummary& k) {
   // Under the bound that is not widened an equivalent arrangement exceeds it: k tells more.
   if (!k.maxBudget || k.verdict == Class::kEquivalent) return "";
   return k.exact ? "exact" : fmt::format("{:.3g}", *k.maxBudget);
+}
+
+std::string casesText(const KernelSummary& k) {
+  std::string text = fmt::format("{}", k.cases);
+  if (k.failed > 0) text = fmt::format("{} of {} failed", k.failed, k.cases);
+  if (k.failed == 0 && k.skipped > 0) text += fmt::format(" ({} skipped)", k.skipped);
+  if (k.waived > 0) text += fmt::format(" ({} waived)", k.waived);
+  return text;
 }
 
 Colour colourOf(const KernelSummary& k) {
@@ -80,11 +90,21 @@ nlohmann::json domainsOf(const KernelSummary& k) {
 
 nlohmann::json failuresOf(const KernelSummary& k, const SessionOptions& options) {
   auto list = nlohmann::json::array();
-  for (const CaseRecord* r : k.records)
+  for (const CaseRecord* r : k.records) {
+    if (r->waived) continue;
     for (const std::string& message : r->messages)
       list.push_back({{"case", r->name},
                       {"reproduce", reproduceCommand(r->name, options)},
                       {"message", message}});
+  }
+  return list;
+}
+
+nlohmann::json waivedOf(const KernelSummary& k) {
+  auto list = nlohmann::json::array();
+  for (const CaseRecord* r : k.records)
+    if (r->waived)
+      list.push_back({{"case", r->name}, {"reason", *r->waived}, {"messages", r->messages}});
   return list;
 }
 
@@ -114,7 +134,9 @@ std::string escaped(const std::string& text) {
 std::string junitCase(const KernelSummary& k, const CaseRecord& r) {
   std::string text = fmt::format(R"(    <testcase classname="{}" name="{}" time="{:.3f}">)",
                                  escaped(k.kernel), escaped(r.name), r.seconds);
-  for (const std::string& m : r.messages)
+  if (r.waived)
+    text += fmt::format("\n      <skipped message=\"waived: {}\"/>", escaped(*r.waived));
+  for (const std::string& m : r.waived ? std::vector<std::string>{} : r.messages)
     text += fmt::format("\n      <failure message=\"{}\">{}</failure>",
                         escaped(m.substr(0, m.find('\n'))), escaped(m));
   if (r.unsupported)
@@ -144,6 +166,7 @@ std::string reproduceCommand(const std::string& caseName, const SessionOptions& 
       fmt::format("./gnomon validate --filter '{}' --seed {}", caseName, options.seed);
   if (options.cases) command += fmt::format(" --cases {}", *options.cases);
   if (!options.device.empty()) command += fmt::format(" --device '{}'", options.device);
+  if (options.timeout) command += fmt::format(" --timeout {}", options.timeout->count());
   for (const auto& [kernel, file] : options.kernels)
     command += fmt::format(" --kernel '{}={}'", kernel, file.string());
   return command;
@@ -153,21 +176,19 @@ std::string summaryTable(const std::vector<KernelSummary>& kernels, const Termin
   std::vector<std::vector<std::string>> rows = {
       {"kernel", "class", "cases", "elements", "worst budget", "time"}};
   for (const KernelSummary& k : kernels) {
-    const std::string cases = k.failed > 0    ? fmt::format("{} of {} failed", k.failed, k.cases)
-                              : k.skipped > 0 ? fmt::format("{} ({} skipped)", k.cases, k.skipped)
-                                              : fmt::format("{}", k.cases);
-    rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), cases, grouped(k.elements),
-                    budgetText(k), fmt::format("{:.1f} s", k.seconds)});
+    rows.push_back({k.kernel, terminal.paint(colourOf(k), className(k)), casesText(k),
+                    grouped(k.elements), budgetText(k), fmt::format("{:.1f} s", k.seconds)});
   }
   return table(rows, "llrrrr");
 }
 
-std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session& session,
+std::string summaryJson(const std::vector<KernelSummary>& kernels, const SessionOptions& options,
                         const GpuInfo& gpu) {
   auto stages = nlohmann::json::array();
-  std::size_t failed = 0;
+  std::size_t failed = 0, waived = 0;
   for (const KernelSummary& k : kernels) {
     failed += k.failed;
+    waived += k.waived;
     stages.push_back({{"stage", k.stage},
                       {"kernel", k.kernel},
                       {"class", k.unsupported ? "unsupported"
@@ -177,6 +198,7 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                       {"cases", k.cases},
                       {"failed", k.failed},
                       {"skipped", k.skipped},
+                      {"waived", k.waived},
                       {"elements", k.elements},
                       {"outside", k.outside},
                       {"ambiguous", k.ambiguous},
@@ -184,8 +206,10 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                       {"maxBudget", k.exact ? nullptr : finite(k.maxBudget)},
                       {"seconds", k.seconds},
                       {"unsupported", k.unsupported ? nlohmann::json(*k.unsupported) : nullptr},
+                      {"unmapped", k.unmapped},
                       {"domains", domainsOf(k)},
-                      {"failures", failuresOf(k, session.options())}});
+                      {"failures", failuresOf(k, options)},
+                      {"waivers", waivedOf(k)}});
   }
   const nlohmann::json json = {{"schema", 1},
                                {"device",
@@ -193,8 +217,9 @@ std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session
                                  {"driver", gpu.driver},
                                  {"api", gpu.api},
                                  {"subgroupSize", gpu.subgroupSize}}},
-                               {"seed", session.options().seed},
+                               {"seed", options.seed},
                                {"stages", stages},
+                               {"waived", waived},
                                {"failed", failed}};
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
@@ -204,7 +229,7 @@ std::string summaryJunit(const std::vector<KernelSummary>& kernels) {
   for (const KernelSummary& k : kernels) {
     text += fmt::format(
         "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" time=\"{:.3f}\">\n",
-        escaped(k.kernel), k.cases, k.failed, k.skipped, k.seconds);
+        escaped(k.kernel), k.cases, k.failed, k.skipped + k.waived, k.seconds);
     for (const CaseRecord* r : k.records) text += junitCase(k, *r);
     text += "  </testsuite>\n";
   }

@@ -16,13 +16,14 @@ struct KernelSummary {
   std::string kernel{};
   Class verdict = Class::kConforms;
   int widening = 0;
-  std::size_t cases = 0, failed = 0, skipped = 0;
+  std::size_t cases = 0, failed = 0, skipped = 0, waived = 0;
   std::size_t elements = 0, outside = 0, ambiguous = 0, reassociated = 0;
   std::optional<double> maxBudget{};  ///< none: nothing was judged
   bool exact = true;                  ///< every output was to be exact
   double seconds = 0;
   std::optional<std::string> unsupported{};
   std::vector<const CaseRecord*> records{};
+  std::vector<std::string> unmapped{};  ///< outputs that a foreign kernel does not give
 };
 
 /// One summary for each kernel, in the order of the records.
@@ -35,10 +36,10 @@ std::string reproduceCommand(const std::string& caseName, const SessionOptions& 
 std::string summaryTable(const std::vector<KernelSummary>& kernels, const Terminal& terminal);
 
 /// `validate --json` (keys are fixed; "domains" holds what each case measured of each field).
-std::string summaryJson(const std::vector<KernelSummary>& kernels, const Session& session,
+std::string summaryJson(const std::vector<KernelSummary>& kernels, const SessionOptions& options,
                         const GpuInfo& gpu);
 
-/// JUnit XML; skipped and unsupported cases are <skipped>, never failures.
+/// JUnit XML; skipped, unsupported and waived cases are <skipped>, never failures.
 std::string summaryJunit(const std::vector<KernelSummary>& kernels);
 
 /// Writes a file whole or throws UsageError naming it; "-" is standard output.

@@ -133,6 +133,23 @@ TEST(Process, AnEndlessLoopIsStoppedAtTheLimit) {
   EXPECT_EQ(result.inWords(), "did not end within 0.3 s and could not be stopped");
 }
 
+TEST(Process, ADeadlineMovesWithWhatTheChildSays) {
+  // Three steps of 0.2 s, each allowed 2 s from the last; then one that does not end.
+  auto until = std::chrono::steady_clock::now() + 2s;
+  int steps = 0;
+  ProcessOptions options;
+  options.limit = 1ms;  // counts for nothing
+  options.onLine = [&](std::string_view) {
+    until = std::chrono::steady_clock::now() + (++steps < 3 ? 2'000ms : 300ms);
+  };
+  options.until = [&] { return until; };
+  const ProcessResult result =
+      shell("for i in 1 2 3; do sleep 0.2; echo $i; done; while :; do :; done", options);
+  EXPECT_EQ(result.end, End::kTimedOut);
+  EXPECT_EQ(steps, 3);
+  EXPECT_LT(result.seconds, kSoon);
+}
+
 TEST(Process, SigtermComesFirstAndLeavesTimeToCleanUp) {
   const ProcessResult result =
       shell("trap 'echo cleaned; exit 0' TERM; while :; do sleep 0.05; done", within(500ms));

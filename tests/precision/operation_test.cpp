@@ -295,6 +295,7 @@ class WorstErrorIsMeasured : public OperationCase {
       });
       worst.add(worstOf(subject, arguments, twinResults(arguments)));
       checked(arguments.size());
+      Session::current().cameFurther();
     }
     return measuredError(worst, static_cast<std::size_t>(last - first + 1), true);
   }
