@@ -98,7 +98,10 @@ std::uint32_t Output::poisoned(std::uint32_t pattern, std::size_t word) const {
 
 std::string Output::place(std::size_t element) const {
   if (!isImage()) return fmt::format("{}[{}]", name, element);
-  return fmt::format("{}({}, {})", name, element % width, element / width);
+  const ImageDescription& pixels = image.description();
+  const std::size_t x = element % width, row = element / width;
+  if (pixels.layers == 1) return fmt::format("{}({}, {})", name, x, row);
+  return fmt::format("{}({}, {}, {})", name, x, row % pixels.height, row / pixels.height);
 }
 
 Resources::Resources(const Subject& subject, const Stimulus& s, Target target)

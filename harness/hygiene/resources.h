@@ -42,7 +42,7 @@ struct Output {
   std::size_t dataBytes() const { return elements * layout.size; }
   /// What a word of an unwritten element reads as after a fill with the pattern.
   std::uint32_t poisoned(std::uint32_t pattern, std::size_t word) const;
-  /// "results[12]" or "target(3, 5)".
+  /// "results[12]" or "target(3, 5)"; of an image with layers "target(3, 5, 1)".
   std::string place(std::size_t element) const;
 };
 

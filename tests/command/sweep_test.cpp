@@ -171,5 +171,13 @@ TEST_F(Sweep, AWorkerRefusesWhatIsNoTask) {
   EXPECT_EQ(gnomonSays("worker").status, 2);
 }
 
+TEST_F(Sweep, AWorkerRefusesACaseThatDoesNotExist) {
+  const Said said = gnomonSays(
+      R"(worker '{"root": "/", "device": "", "seed": 1, "generated": null, "timeout": null, )"
+      R"("kernels": {}, "validation": true, "cases": ["No.SuchCase"]}')");
+  EXPECT_EQ(said.status, 2) << said.output;
+  EXPECT_TRUE(mentions(said, "cases that do not exist"));
+}
+
 }  // namespace
 }  // namespace gnomon

@@ -282,6 +282,29 @@ TEST_F(ImageHygiene, LayersOfAnOutputFollowEachOther) {
   }
 }
 
+// Below the least normal half, the largest, one with all of its bits, a zero with its sign.
+TEST_F(ImageHygiene, HalvesAtTheEndsOfTheirRangeAreReadBackBitForBit) {
+  const Observation seen = painted(recordOf({output(PixelFormat::kRgba16f)}),
+                                   painter(paint("vec4(ldexp(1.0, -24), -65504.0, "
+                                                 "uintBitsToFloat(0x3faaa000u), -0.0)")));
+  EXPECT_TRUE(seen.findings.empty()) << all(seen);
+  const auto got = elementsOf<std::uint32_t>(seen.twin.at("target as RGBA16F"));
+  ASSERT_EQ(got.size(), 4 * kPixels);
+  for (std::size_t i = 0; i < kPixels; ++i)
+    EXPECT_EQ(std::vector(&got[4 * i], &got[4 * i] + 4),
+              (std::vector{0x33800000u, 0xc77fe000u, 0x3faaa000u, 0x80000000u}));
+}
+
+TEST_F(ImageHygiene, AnUnwrittenPixelOfALaterLayerIsNamedWithItsLayer) {
+  const Observation seen =
+      painted(recordOf({output(PixelFormat::kR32f, "image2DArray")}),
+              painter("for (int k = 0; k < 3; ++k) if (k != 2 || p != ivec2(3, 1))"
+                      "  imageStore(target, ivec3(p, k), vec4(1));",
+                      "image2DArray"),
+              3);
+  EXPECT_TRUE(finds(seen.findings, "first target(3, 1, 2).r")) << all(seen);
+}
+
 // ---- inputs ---------------------------------------------------------------------------------
 
 /// Reads the source with an expression, texel i of the count, into the buffer.
@@ -415,6 +438,40 @@ TEST_F(ImageHygiene, MipLevelsAreFetched) {
                 numbers);
 }
 
+// Which of the two orders it is, neither layers nor levels alone would show.
+TEST_F(ImageHygiene, EveryLayerBringsItsMipLevels) {
+  ImageDescription layered = kLevels;
+  layered.layers = 3;
+  const auto numbers = counting(33);
+  expectNumbers(
+      readBack({source("texture2DArray")}, inputOf(layered, numbers),
+               reader(counted(33, "layout(set = 0, binding = 0) uniform texture2DArray source;"),
+                      "i % 11 < 8 ? texelFetch(source, ivec3(i % 11 % 4, i % 11 / 4, i / 11), 0) : "
+                      "i % 11 < 10 ? texelFetch(source, ivec3(i % 11 - 8, 0, i / 11), 1) : "
+                      "texelFetch(source, ivec3(0, 0, i / 11), 2)"),
+               33),
+      numbers);
+}
+
+TEST_F(ImageHygiene, PicturesAreReadAsTheirOwnNumbers) {
+  Picture picture{.size = {kWidth, kHeight}, .texels = {}};
+  for (std::size_t i = 0; i < kPixels; ++i)
+    picture.texels.emplace_back(0.1f * static_cast<float>(i), -1e5f, 0x1p-24f, 1.0f / 3);
+  const SpirvWords module =
+      reader(counted(kPixels, kFetched),
+             fmt::format("texelFetch(source, ivec2(i % {0}, i / {0}), 0)", kWidth));
+  EXPECT_EQ(readBack({source("texture2D")}, floatImage("source", picture), module, kPixels),
+            picture.texels);
+  for (const PixelFormat format :
+       {PixelFormat::kR16f, PixelFormat::kRg16f, PixelFormat::kRgba16f}) {
+    const HalfImage halves("source", picture, format);
+    EXPECT_EQ(readBack({source("texture2D")}, halves.input(), module, kPixels),
+              halves.picture().texels)
+        << nameOf(format);
+    EXPECT_NE(halves.picture().texels, picture.texels) << nameOf(format);
+  }
+}
+
 TEST_F(ImageHygiene, MipLevelsAreSampled) {
   const auto got = readBack(
       {source("sampler2D", {.linear = false, .linearMips = true})}, inputOf(kLevels, counting(11)),
@@ -438,6 +495,27 @@ TEST_F(ImageHygiene, ASamplerOfItsOwnSamplesAnImage) {
              "textureLod(sampler2D(source, linear), vec2(0.25 + 0.25 * i, 0.5), 0.0)"),
       3);
   expectNumbers(got, {0, 0.5f, 1});
+}
+
+TEST_F(ImageHygiene, ASamplerOfItsOwnIsWhatItsRecordSays) {
+  using Address = SamplerDescription::Address;
+  const auto sampled = [](Address address) {
+    const ImageSpec sampler{.name = "how",
+                            .binding = 1,
+                            .access = Access::kRead,
+                            .type = "sampler",
+                            .sampler = {.address = address}};
+    return readBack(
+        {source("texture2D"), sampler},
+        inputOf({.format = PixelFormat::kR32f, .width = 4}, counting(4)),
+        reader(counted(4, fmt::format("{}\nlayout(set = 0, binding = 1) uniform sampler how;",
+                                      kFetched)),
+               "textureLod(sampler2D(source, how), vec2(1.125 + 0.25 * i, 0.5), 0.0)"),
+        4);
+  };
+  expectNumbers(sampled(Address::kClamp), {3, 3, 3, 3});
+  expectNumbers(sampled(Address::kRepeat), {0, 1, 2, 3});
+  expectNumbers(sampled(Address::kMirror), {3, 2, 1, 0});
 }
 
 TEST_F(ImageHygiene, AnInputWithTheWrongNumberOfBytesIsAProgrammersError) {
@@ -523,6 +601,21 @@ TEST_F(ImageHygiene, EitherNeighbouringCodeIsAcceptedAndNoOther) {
     const Verdict v = judged(*gpu, record, seen, half, Storage::unorm8, "target as R8");
     EXPECT_EQ(v.verdict, verdict) << code;
     EXPECT_EQ(v.outside, verdict == Class::kWrong ? kPixels : 0u) << code;
+  }
+}
+
+TEST_F(ImageHygiene, EitherNeighbouringHalfIsAcceptedAndNoOther) {
+  const KernelRecord record = recordOf({output(PixelFormat::kR16f)});
+  const auto third = []<class T>(std::size_t) { return GreyOf<T>{T(1.0f / 3)}; };
+  for (const auto& [half, verdict] :
+       {std::pair{0x1.550p-2f, Class::kWrong}, std::pair{0x1.554p-2f, Class::kConforms},
+        std::pair{0x1.558p-2f, Class::kConforms}, std::pair{0x1.55cp-2f, Class::kWrong}}) {
+    Observation seen;
+    const std::vector<float> pixels(kPixels, half);
+    const auto bytes = std::as_bytes(std::span(pixels));
+    seen.plain["target as R16F"] = seen.twin["target as R16F"] = {bytes.begin(), bytes.end()};
+    EXPECT_EQ(judged(*gpu, record, seen, third, Storage::half, "target as R16F").verdict, verdict)
+        << half;
   }
 }
 
