@@ -111,17 +111,17 @@ ShadedOf<T> evaluate(const Sample& s) {
   const Vec3<T> irradiance = limited<T>(s.irradiance, kMaxIrradiance);
   const T scale = inversesqrt(dot(halfway, halfway));
   const Vec3<T> nxh = cross(n, halfway) * scale;
-  const T NoV = max(cosine(dot(n, v)), T(kMinNoV));
-  const T NoL = cosine(dot(n, l));
-  const T VoH = cosine(dot(v, halfway) * scale);
-  const Vec3<T> F0 = mix(splat(T(kDielectricF0)), albedo, metallic);
+  const T NoV = named(max(cosine(dot(n, v)), T(kMinNoV)), "NoV");
+  const T NoL = named(cosine(dot(n, l)), "NoL");
+  const T VoH = named(cosine(dot(v, halfway) * scale), "VoH");
+  const Vec3<T> F0 = named(mix(splat(T(kDielectricF0)), albedo, metallic), "F0");
   const T k = kDirect(r);
 
   ShadedOf<T> o;
-  o.D = D_GGX(nxh, named(dot(n, halfway) * scale, "NoH"), r * r);
-  o.G = G1_Schlick(NoV, k) * G1_Schlick(NoL, k);
-  o.F = F_Schlick(VoH, F0);
-  o.ambientF = F_SchlickRoughness(NoV, F0, r);
+  o.D = named(D_GGX(nxh, named(dot(n, halfway) * scale, "NoH"), r * r), "D");
+  o.G = named(G1_Schlick(NoV, k) * G1_Schlick(NoL, k), "G");
+  o.F = named(F_Schlick(VoH, F0), "F");
+  o.ambientF = named(F_SchlickRoughness(NoV, F0, r), "ambientF");
   o.diffuse = (splat(T(1)) - o.F) * (T(1) - metallic) * albedo / pi<T>();
   o.specular = o.F * (o.D * o.G / max(T(4) * NoV * NoL, T(kMinDenominator)));
   o.radiance = (o.diffuse + o.specular) * NoL * irradiance;

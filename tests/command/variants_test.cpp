@@ -1,7 +1,9 @@
-// Two lists as data: kernels with one deliberate fault, each of which must be called wrong.
+// Two lists as data: kernels with one deliberate fault, each of which must be called wrong, and
+// correct re-formulations, none of which may be.
 //
-// Every variant is the project's own kernel with one piece of text replaced, judged through
-// --kernel as a user's file would be.
+// A variant is the project's own kernel with some text replaced or optimised, or one of
+// data/kernels, judged through --kernel as a user's file would be.
+#include <cstdlib>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -16,15 +18,33 @@ namespace {
 namespace fs = std::filesystem;
 const fs::path kRoot = GNOMON_SOURCE_DIR;
 
+struct Edit {
+  std::string file, from, to;
+};
+
+/// A kernel of the project's with some text replaced, or optimised, or one of data/kernels.
 struct Variant {
-  std::string name, kernel, file, from, to;
+  std::string name, kernel, verdict, adapter;
+  bool optimise = false;
+  std::vector<Edit> edits;
 };
 void PrintTo(const Variant& v, std::ostream* out) { *out << v.kernel << ": " << v.name; }
 
+Edit editOf(const nlohmann::json& j) { return {j["file"], j["from"], j["to"]}; }
+
 std::vector<Variant> variants(const char* list) {
   std::vector<Variant> all;
-  for (const auto& v : nlohmann::json::parse(std::ifstream(kRoot / "tests/variants" / list)))
-    all.push_back({v["name"], v["kernel"], v["file"], v["from"], v["to"]});
+  for (const auto& j : nlohmann::json::parse(std::ifstream(kRoot / "tests/variants" / list))) {
+    Variant v{.name = j["name"],
+              .kernel = j["kernel"],
+              .verdict = j.value("class", "wrong"),
+              .adapter = j.value("adapter", ""),
+              .optimise = j.value("optimise", false),
+              .edits = {}};
+    if (j.contains("from")) v.edits.push_back(editOf(j));
+    for (const auto& e : j.value("edits", nlohmann::json::array())) v.edits.push_back(editOf(e));
+    all.push_back(std::move(v));
+  }
   return all;
 }
 
@@ -33,18 +53,34 @@ std::string read(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A copy of kernels/ in which the variant's text is replaced; the text must be there, once.
-fs::path patchedKernel(const Scratch& scratch, const Variant& v) {
+/// The text must be there, once.
+void apply(const Edit& e, const fs::path& kernels) {
+  std::string text = read(kernels / e.file);
+  const std::size_t at = text.find(e.from);
+  ASSERT_NE(at, std::string::npos) << e.file << " no longer holds '" << e.from << "'";
+  ASSERT_EQ(text.find(e.from, at + 1), std::string::npos) << "'" << e.from << "' is not unique";
+  std::ofstream(kernels / e.file) << text.replace(at, e.from.size(), e.to);
+}
+
+fs::path optimised(const fs::path& shader, const fs::path& kernels) {
+  const fs::path spirv = kernels / "optimised.spv";
+  const std::string made = fmt::format(
+      "glslangValidator --quiet -V --target-env vulkan1.2 -I{} -o {} {} && spirv-opt -O {} -o {}",
+      kernels.string(), spirv.string(), shader.string(), spirv.string(), spirv.string());
+  EXPECT_EQ(std::system(made.c_str()), 0) << made;
+  return spirv;
+}
+
+/// The variant's file, in a copy of kernels/.
+fs::path fileOf(const Variant& v, const Scratch& scratch) {
+  if (!v.adapter.empty()) return kRoot / "data/kernels" / v.adapter;
   const fs::path copy = scratch.path() / "kernels";
   fs::copy(kRoot / "kernels", copy, fs::copy_options::recursive);
-  std::string text = read(copy / v.file);
-  const std::size_t at = text.find(v.from);
-  EXPECT_NE(at, std::string::npos) << v.file << " no longer holds '" << v.from << "'";
-  if (at == std::string::npos) return {};
-  EXPECT_EQ(text.find(v.from, at + 1), std::string::npos) << "'" << v.from << "' is not unique";
-  std::ofstream(copy / v.file) << text.replace(at, v.from.size(), v.to);
+  for (const Edit& e : v.edits) apply(e, copy);
   // Entries that share a shader are not called after it.
-  return v.file.ends_with(".comp") ? copy / v.file : copy / (v.kernel + ".comp");
+  const bool shared = !v.edits.empty() && v.kernel.starts_with("precision/");
+  const fs::path shader = copy / (shared ? v.edits.front().file : v.kernel + ".comp");
+  return v.optimise ? optimised(shader, copy) : shader;
 }
 
 class WrongVariant : public testing::TestWithParam<Variant> {};
@@ -52,10 +88,22 @@ class WrongVariant : public testing::TestWithParam<Variant> {};
 TEST_P(WrongVariant, IsCalledWrong) {
   const Variant& v = GetParam();
   const Scratch scratch;
-  const fs::path kernel = patchedKernel(scratch, v);
-  const Said said = gnomonSays(
-      fmt::format("validate {0} --cases 4096 --kernel {0}={1}", v.kernel, kernel.string()));
+  const Said said = gnomonSays(fmt::format("validate {0} --cases 4096 --kernel {0}={1}", v.kernel,
+                                           fileOf(v, scratch).string()));
   EXPECT_EQ(said.status, 1) << said.output;
+}
+
+class RightVariant : public testing::TestWithParam<Variant> {};
+
+TEST_P(RightVariant, IsNeverCalledWrong) {
+  const Variant& v = GetParam();
+  const Scratch scratch;
+  const fs::path json = scratch.path() / "verdict.json";
+  const Said said = gnomonSays(fmt::format("validate {0} --cases 16384 --json {1} --kernel {0}={2}",
+                                           v.kernel, json.string(), fileOf(v, scratch).string()));
+  ASSERT_EQ(said.status, 0) << said.output;
+  const auto stages = nlohmann::json::parse(std::ifstream(json))["stages"];
+  EXPECT_EQ(stages.at(0)["class"], v.verdict) << said.output;
 }
 
 std::string identifier(const testing::TestParamInfo<Variant>& info) {
@@ -66,6 +114,8 @@ std::string identifier(const testing::TestParamInfo<Variant>& info) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, WrongVariant, testing::ValuesIn(variants("wrong.json")),
+                         identifier);
+INSTANTIATE_TEST_SUITE_P(Kernels, RightVariant, testing::ValuesIn(variants("right.json")),
                          identifier);
 
 }  // namespace
