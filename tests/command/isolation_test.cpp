@@ -293,6 +293,7 @@ TEST(Waiver, ExcusesAFailureAndIsCounted) {
   EXPECT_EQ(judged.said.status, 0) << judged.said.output;
   EXPECT_EQ(judged.json["failed"], 0);
   EXPECT_EQ(judged.json["waived"], 1);
+  ASSERT_EQ(judged.json["stages"][0]["waivers"].size(), 1u) << judged.said.output;
   EXPECT_EQ(judged.json["stages"][0]["waived"], 1);
   EXPECT_EQ(judged.json["stages"][0]["waivers"][0]["case"], kCase);
   EXPECT_EQ(judged.json["stages"][0]["class"], "conforms");

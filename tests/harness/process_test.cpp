@@ -134,19 +134,19 @@ TEST(Process, AnEndlessLoopIsStoppedAtTheLimit) {
 }
 
 TEST(Process, ADeadlineMovesWithWhatTheChildSays) {
-  // Three steps of 0.2 s, each allowed 2 s from the last; then one that does not end.
+  // Five steps of 0.5 s, each allowed 2 s from the last; then one that does not end.
   auto until = std::chrono::steady_clock::now() + 2s;
   int steps = 0;
   ProcessOptions options;
   options.limit = 1ms;  // counts for nothing
   options.onLine = [&](std::string_view) {
-    until = std::chrono::steady_clock::now() + (++steps < 3 ? 2'000ms : 300ms);
+    until = std::chrono::steady_clock::now() + (++steps < 5 ? 2'000ms : 300ms);
   };
   options.until = [&] { return until; };
   const ProcessResult result =
-      shell("for i in 1 2 3; do sleep 0.2; echo $i; done; while :; do :; done", options);
+      shell("for i in 1 2 3 4 5; do sleep 0.5; echo $i; done; while :; do :; done", options);
   EXPECT_EQ(result.end, End::kTimedOut);
-  EXPECT_EQ(steps, 3);
+  EXPECT_EQ(steps, 5);
   EXPECT_LT(result.seconds, kSoon);
 }
 
