@@ -10,6 +10,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/error.h"
+#include "harness/isolate/worker.h"
 #include "harness/program/kernel.h"
 #include "harness/report/summary.h"
 #include "harness/report/terminal.h"
@@ -130,7 +131,10 @@ int bench(const BenchOptions& given) {
   std::erase_if(before, [chosen = std::regex(filter)](const auto& b) {
     return !std::regex_search(b.first, chosen);
   });
+  for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
   Session session(options.session);
+  // Somebody's file may crash or hang whoever compiles it: a worker finds out first.
+  if (!options.session.kernels.empty()) prepare(options.session, session.policy());
   Terminal terminal(options.json == "-" ? stderr : stdout);
   terminal.print(fmt::format("{}, {}", session.gpu().info().name, session.gpu().info().driver));
 

@@ -49,6 +49,7 @@ struct BenchOptions {
   SessionOptions session;
   std::vector<std::string> stages;
   std::filesystem::path baseline;
+  std::optional<unsigned> jobs{};  ///< taken, and not used: benchmarks run one at a time
   std::string json;
 };
 int bench(const BenchOptions& options);

@@ -35,7 +35,7 @@ void addKernelOption(CLI::App& command, SessionOptions& session) {
               session.kernels[pair.substr(0, equals)] = pair.substr(equals + 1);
             }
           },
-          "Judge FILE (GLSL or .spv) in place of the project's kernel")
+          "Judge FILE (GLSL, HLSL, SPIR-V or a JSON adapter) in place of the project's kernel")
       ->type_name("STAGE/ENTRY=FILE")
       ->take_all();
 }
@@ -132,6 +132,9 @@ void addBench(CLI::App& app, Action& action) {
                    "Compare with an earlier --json; exit 1 where slower than the policy allows")
       ->check(CLI::ExistingFile)
       ->type_name("FILE");
+  command->add_option("--jobs", o->jobs, "Taken for scripts; benchmarks run one at a time")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
   addSessionOptions(*command, o->session, o->json);
   command->footer(kExit);
   command->callback([&action, o] { action = [o] { return bench(*o); }; });

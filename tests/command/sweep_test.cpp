@@ -173,7 +173,7 @@ TEST_F(Sweep, AWorkerRefusesWhatIsNoTask) {
 
 TEST_F(Sweep, AWorkerRefusesACaseThatDoesNotExist) {
   const Said said = gnomonSays(
-      R"(worker '{"root": "/", "device": "", "seed": 1, "generated": null, "timeout": null, )"
+      R"(worker '{"root": "/", "device": "", "seed": 1, "generated": null, "timeout": null, "errors": null, )"
       R"("kernels": {}, "validation": true, "cases": ["No.SuchCase"]}')");
   EXPECT_EQ(said.status, 2) << said.output;
   EXPECT_TRUE(mentions(said, "cases that do not exist"));
