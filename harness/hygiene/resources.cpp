@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "harness/error.h"
+
 namespace gnomon {
 namespace {
 
@@ -110,6 +112,7 @@ Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
       interface(subject.interface()),
       conventions(subject.conventions()),
       stimulus(s),
+      origin(subject.origin()),
       memories(interface.buffers.size()),
       ownSampler(gpu.makeSampler({.linear = true})) {
   for (const ImageSpec& i : record.images)
@@ -119,6 +122,7 @@ Resources::Resources(const Subject& subject, const Stimulus& s, Target target)
   packInputs();
   packParameters();
   allocate();
+  markSharedWords();
   for (const InputImage& i : s.inputImages) addInputImage(i);
   for (const OutputImage& o : s.outputImages) addOutputImage(o, target);
   bind();
@@ -133,6 +137,11 @@ void Resources::layOut() {
   const auto hold = [&](const std::string& name, std::size_t elements) {
     for (const auto& place : interface.placesOf(name))
       if (place) {
+        const ModuleBuffer& buffer = interface.buffers[place->buffer];
+        if (elements > 1 && (buffer.stride == 0 || place->offset < buffer.bytes))
+          throw UsageError(fmt::format("{}: '{}' keeps one {}.{}, of which this case has {}",
+                                       origin, buffer.name, name, place->field.name,
+                                       elements));
         std::size_t& held = memories[place->buffer].elements;
         held = std::max(held, elements);
       }
@@ -194,6 +203,36 @@ void Resources::allocate() {
     m.after = uniform ? 0 : kGuardBytes;
     m.buffer = gpu.allocate(m.before + m.size + m.after);
   }
+}
+
+/// In a buffer that holds more than outputs, what stands where before a run, and after it.
+void Resources::markSharedWords() {
+  std::vector<Bytes> given(memories.size()), output(memories.size());
+  const auto mark = [&](std::vector<Bytes>& marks, const Place& place, std::size_t elements) {
+    if (place.buffer == Place::kPush) return;
+    const Memory& m = memories[place.buffer];
+    if (!m.spec->written || m.content.empty()) return;
+    marks[place.buffer].resize(m.size);
+    const Bytes ones(place.field.offset + place.field.scalars * kWord, std::byte{0xff});
+    for (std::size_t e = 0; e < elements; ++e)
+      pack(place, ones, std::span(marks[place.buffer]).subspan(e * m.spec->stride), {});
+  };
+  for (const InputBytes& i : stimulus.inputs)
+    for (const auto& place : interface.placesOf(i.buffer))
+      if (place) mark(given, *place, i.bytes.size() / record.buffer(i.buffer).element.size);
+  for (const Place& place : interface.push) mark(given, place, 1);
+  for (const OutputCount& o : stimulus.outputs)
+    for (const auto& place : interface.placesOf(o.buffer))
+      if (place) mark(output, *place, o.elements);
+  const auto marked = [](const Bytes& marks, std::size_t at) {
+    return at < marks.size() && marks[at] != std::byte{};
+  };
+  for (std::size_t i = 0; i < memories.size(); ++i)
+    for (std::size_t at = 0; at < std::max(given[i].size(), output[i].size()); at += kWord) {
+      const bool isGiven = marked(given[i], at), isOutput = marked(output[i], at);
+      if (isOutput && !isGiven) memories[i].open.push_back(at);
+      if (isGiven && !isOutput) memories[i].kept.push_back(at);
+    }
 }
 
 void Resources::addInputImage(const InputImage& input) {
@@ -279,8 +318,11 @@ void Resources::poisonOutputs(std::uint32_t poison) {
   for (const Memory& m : memories) {
     if (!m.spec->written) continue;
     gpu.fill(m.buffer, poison);
-    // A header, or inputs that share the buffer, stand before the elements that are written.
-    if (!m.content.empty()) gpu.upload(m.buffer, m.before, m.content);
+    // A header, or inputs that share the buffer, stand there before the run.
+    if (m.content.empty()) continue;
+    Bytes start = m.content;
+    for (const std::size_t at : m.open) std::memcpy(start.data() + at, &poison, kWord);
+    gpu.upload(m.buffer, m.before, start);
   }
   for (const Output& o : out)
     if (o.isImage()) gpu.fillImage(o.image, repeated(poison));
@@ -296,6 +338,7 @@ Aftermath Resources::run(const GpuProgram& program, std::uint32_t poison) {
     contents[i].resize(memories[i].buffer.size());
     gpu.download(memories[i].buffer, 0, contents[i]);
     checkGuards(memories[i], contents[i], poison, after.strays);
+    checkKept(memories[i], contents[i], after.strays);
   }
   for (const Output& o : out)
     after.outputs.push_back(o.isImage() ? downloadImage(o) : unpacked(o, contents));
@@ -324,6 +367,13 @@ void Resources::checkGuards(const Memory& m, const Bytes& whole, std::uint32_t p
       return strays.push_back(
           fmt::format("wrote past the end of '{}': byte {} after its {} elements", m.spec->name,
                       at - end, m.elements));
+}
+
+void Resources::checkKept(const Memory& m, const Bytes& whole,
+                          std::vector<std::string>& strays) const {
+  for (const std::size_t at : m.kept)
+    if (std::memcmp(whole.data() + m.before + at, m.content.data() + at, kWord) != 0)
+      return strays.push_back("wrote into its input, at " + inputPlace(m, at));
 }
 
 std::string Resources::inputPlace(const Memory& m, std::size_t byte) const {

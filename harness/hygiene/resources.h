@@ -80,6 +80,8 @@ class Resources {
     const ModuleBuffer* spec = nullptr;
     std::size_t elements = 0;
     Bytes content{};  ///< what a run starts from; empty where that is all poison
+    std::vector<std::size_t> open{};  ///< bytes in content: words of outputs that nothing is given for
+    std::vector<std::size_t> kept{};  ///< words of inputs that are no outputs
     std::size_t size = 0, before = 0, after = 0;
     GpuBuffer buffer{};
   };
@@ -88,6 +90,7 @@ class Resources {
   void packInputs();
   void packParameters();
   void allocate();
+  void markSharedWords();
   void addInputImage(const InputImage& input);
   void addOutputImage(const OutputImage& output, Target target);
   void bind();
@@ -95,6 +98,7 @@ class Resources {
   void poisonOutputs(std::uint32_t poison);
   void checkGuards(const Memory& memory, const Bytes& whole, std::uint32_t poison,
                    std::vector<std::string>& strays) const;
+  void checkKept(const Memory& memory, const Bytes& whole, std::vector<std::string>& strays) const;
   Bytes unpacked(const Output& output, const std::vector<Bytes>& memories) const;
   Bytes downloadImage(const Output& output) const;
   std::string inputPlace(const Memory& memory, std::size_t byte) const;
@@ -104,6 +108,7 @@ class Resources {
   const Interface& interface;
   const Conventions& conventions;
   const Stimulus& stimulus;
+  const std::string& origin;
   std::vector<Memory> memories;  ///< as Interface::buffers
   std::vector<Output> out;
   std::vector<GpuImage> inImages;

@@ -17,6 +17,7 @@ using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = 1u << 20;
+constexpr int kMaxDepth = 8;  // no key goes deeper than 2; what is printed is printed recursively
 
 /// One value of the file, with the name that a message gives it.
 class Value {
@@ -24,7 +25,7 @@ class Value {
   Value(const Json& j, std::string n, const fs::path& f) : json(j), name(std::move(n)), file(f) {}
 
   UsageError wrong(const std::string& expected) const {
-    std::string found = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    std::string found = json.dump(-1, ' ', true, Json::error_handler_t::replace);
     if (found.size() > 60) found = found.substr(0, 60) + "...";
     return UsageError(
         fmt::format("{}: '{}' must be {}, not {}", file.string(), name, expected, found));
@@ -86,7 +87,11 @@ Json parsed(const fs::path& file) {
     throw UsageError(fmt::format("{}: larger than {} bytes", file.string(), kMaxBytes));
   std::ifstream stream(file, std::ios::binary);
   try {
-    Json json = Json::parse(stream);
+    Json json = Json::parse(stream, [&](int depth, Json::parse_event_t, Json&) {
+      if (depth > kMaxDepth)
+        throw UsageError(fmt::format("{}: nested more than {} deep", file.string(), kMaxDepth));
+      return true;
+    });
     if (!json.is_object())
       throw UsageError(fmt::format("{}: an adapter is a JSON object", file.string()));
     return json;

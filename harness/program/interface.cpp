@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include <fmt/format.h>
@@ -13,6 +15,7 @@ namespace gnomon {
 namespace {
 
 constexpr unsigned kWord = 4;
+constexpr double kMostThreads = 65535;  // the device says what it can; this is a number at all
 
 /// "items[].n" and "items[4].n" name the same member of an element.
 std::string withoutSizes(const std::string& path) {
@@ -67,6 +70,8 @@ class Matcher {
     for (const ImageSpec& i : record.images) placeImage(i);
     takeConstants();
     takeSpecialization();
+    refuseUnknownNames();
+    refuseHalfGiven();
     refuseLeftovers();
     return std::move(result);
   }
@@ -74,6 +79,26 @@ class Matcher {
   const std::vector<std::string>& contradictions() const { return lines; }
 
  private:
+  /// A name on the left of 'fields' or 'bindings' that is not the contract's would change nothing.
+  void refuseUnknownNames() {
+    if (adapter == nullptr) return;
+    std::set<std::string> fields, bound;
+    for (const Field& f : record.push.fields) fields.insert("push." + f.name);
+    for (const BufferSpec& b : record.buffers) {
+      bound.insert(b.name);
+      for (const Field& f : b.element.fields) fields.insert(b.name + "." + f.name);
+    }
+    for (const ImageSpec& i : record.images) bound.insert(i.name);
+    for (const auto& [key, path] : adapter->fields)
+      if (!fields.contains(key))
+        lines.push_back(fmt::format("'fields' maps {} to '{}'; the contract has {}", key, path,
+                                    fmt::join(fields, ", ")));
+    for (const auto& [name, at] : adapter->bindings)
+      if (!bound.contains(name))
+        lines.push_back(fmt::format("'bindings' puts '{}' at set {}, binding {}; the contract has {}",
+                                    name, at[0], at[1], fmt::join(bound, ", ")));
+  }
+
   bool named(const std::string& key) const {
     return adapter != nullptr && adapter->fields.contains(key);
   }
@@ -150,6 +175,12 @@ class Matcher {
             .rowMajor = m.rowMajor};
   }
 
+  /// Whether a member is there once for each element of its block's runtime array.
+  static bool repeated(const ReflectedBinding* block, const ReflectedMember& m) {
+    return block != nullptr &&
+           (block->stride > 0 || (!m.arrays.empty() && m.arrays[0].count == 0));
+  }
+
   /// A member by its path, below its binding's name or not.
   const ReflectedMember* member(const std::vector<ReflectedMember>& members,
                                 const std::string& block, const std::string& path) const {
@@ -177,6 +208,7 @@ class Matcher {
     const ReflectedBinding* block = nullptr;  ///< none: push constants
     const ReflectedMember* member = nullptr;
     unsigned component = 0;
+    bool ofVector = false;
   };
 
   /// In the preferred block first, for a path may leave its name out.
@@ -230,6 +262,17 @@ class Matcher {
     if (!fits(ours, *found.member) || !inside) {
       lines.push_back(fmt::format("'fields' maps {}, a {}, to '{}', in a {}", key, ours.type, path,
                                   found.member->type));
+      return std::nullopt;
+    }
+    const bool parameter = key.starts_with("push.");
+    if (!parameter && found.block == nullptr) {
+      lines.push_back(fmt::format(
+          "'fields' maps {}, of which there are many, to '{}', a push constant", key, path));
+      return std::nullopt;
+    }
+    if (parameter && repeated(found.block, *found.member)) {
+      lines.push_back(fmt::format(
+          "'fields' maps {}, of which there is one, to '{}', in a runtime array", key, path));
       return std::nullopt;
     }
     if (found.block != nullptr) used.insert(found.block);
@@ -408,21 +451,77 @@ class Matcher {
     }
   }
 
+  /// "params.tint", "params.tint.y", "push@8".
   bool presetNamed(const std::string& key, double value) {
-    const auto preset = [&](const ReflectedMember& m, unsigned buffer) {
-      if (taken.contains(&m)) return false;
-      taken.insert(&m);
-      result.presets.push_back({buffer, m.offset, bitsOf(m.type, value)});
-      return true;
+    const Found found = parameterAt(key);
+    if (found.member == nullptr) return false;
+    const ReflectedMember& m = *found.member;
+    if (taken.contains(&m) && !given.contains(&m)) return false;  // the contract's
+    taken.insert(&m);
+    if (found.block != nullptr) used.insert(found.block);
+    const std::string type = found.ofVector ? scalarOf(m.type) : m.type;
+    if (repeated(found.block, m))
+      lines.push_back(fmt::format("'constants' gives '{}' a value, in a runtime array", key));
+    else if (holds("constants", key, type, value))
+      result.presets.push_back({found.block == nullptr ? Place::kPush : indexOf(found.block),
+                                m.offset + kWord * found.component, bitsOf(type, value)});
+    given[&m] += found.ofVector ? 1 : components(m.type);
+    return true;
+  }
+
+  Found parameterAt(const std::string& path) const {
+    if (const Found whole = wholeParameterAt(path); whole.member != nullptr) return whole;
+    const std::size_t component = std::string_view("xyzwrgba").find(path.back());
+    if (path.size() < 3 || path[path.size() - 2] != '.' || component == std::string_view::npos)
+      return {};
+    Found found = wholeParameterAt(path.substr(0, path.size() - 2));
+    if (found.member == nullptr || found.member->matrixStride > 0 ||
+        component % 4 >= components(found.member->type))
+      return {};
+    found.component = component % 4;
+    found.ofVector = true;
+    return found;
+  }
+
+  Found wholeParameterAt(const std::string& path) const {
+    const std::size_t at = path.find('@');
+    const auto in = [&](const std::vector<ReflectedMember>& members, const std::string& block) {
+      if (at == std::string::npos) return member(members, block, path);
+      const auto found = std::ranges::find_if(members, [&](const ReflectedMember& m) {
+        return path == fmt::format("{}@{}", block, m.offset);
+      });
+      return found == members.end() ? nullptr : &*found;
     };
-    if (const ReflectedMember* m = member(module.push, "push", key))
-      return preset(*m, Place::kPush);
+    if (const ReflectedMember* m = in(module.push, "push")) return {nullptr, m};
     for (const ReflectedBinding* block : blocks)
-      if (const ReflectedMember* m = member(block->members, block->name, key)) {
-        used.insert(block);
-        return preset(*m, indexOf(block));
-      }
-    return false;
+      if (const ReflectedMember* m = in(block->members, block->name)) return {block, m};
+    return {};
+  }
+
+  static std::string scalarOf(const std::string& vector) {
+    if (vector.starts_with("vec")) return "float";
+    if (vector.starts_with("uvec")) return "uint";
+    return vector.starts_with("ivec") ? "int" : vector;
+  }
+
+  void refuseHalfGiven() {
+    for (const auto& [m, count] : given)
+      if (count < components(m->type))
+        lines.push_back(fmt::format("'constants' gives {} of the {} components of '{}'", count,
+                                    components(m->type), m->path));
+  }
+
+  /// Whether a scalar of that type can be this number; else it is a contradiction.
+  bool holds(const char* where, const std::string& key, const std::string& type, double value) {
+    const bool whole = value == std::trunc(value);
+    const bool fine = type == "float"  ? std::abs(value) <= std::numeric_limits<float>::max()
+                      : type == "uint" ? whole && value >= 0 && value <= 4294967295.0
+                      : type == "int"  ? whole && std::abs(value) <= 2147483647.0
+                                       : type == "bool" && (value == 0 || value == 1);
+    if (!fine)
+      lines.push_back(fmt::format("'{}' gives '{}' the number {}, but it is {} in the shader",
+                                  where, key, value, type));
+    return fine;
   }
 
   static std::uint32_t bitsOf(const std::string& type, double value) {
@@ -442,6 +541,7 @@ class Matcher {
             "'specialization' gives '{}' a value, but the shader has no such constant", key));
         continue;
       }
+      if (!holds("specialization", key, found->type, value)) continue;
       result.specialization[found->id] = bitsOf(found->type, value);
       for (unsigned axis = 0; axis < 3; ++axis)
         if (module.groupSizeIds[axis] == found->id) resizeGroup(axis, value);
@@ -449,6 +549,11 @@ class Matcher {
   }
 
   void resizeGroup(unsigned axis, double value) {
+    if (value < 1 || value > kMostThreads) {
+      lines.push_back(fmt::format("'specialization' makes a group of {} threads on axis {}", value,
+                                  axis));
+      return;
+    }
     const auto threads = static_cast<unsigned>(value);
     result.groupSize[axis] = threads;
     if (!adapter->grid) result.covered[axis] = threads;
@@ -497,6 +602,7 @@ class Matcher {
   std::vector<const ReflectedBinding*> blocks;  ///< as result.buffers
   std::set<const ReflectedBinding*> used;
   std::set<const ReflectedMember*> taken;
+  std::map<const ReflectedMember*, unsigned> given;  ///< components that 'constants' names
   std::vector<std::string> lines;
   std::vector<std::string> missing;  ///< of the field at hand
 };
