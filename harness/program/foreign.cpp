@@ -9,6 +9,7 @@
 
 #include "harness/error.h"
 #include "harness/program/compile.h"
+#include "harness/program/reflect.h"
 
 namespace gnomon {
 namespace {
@@ -82,14 +83,20 @@ void leaveOut(Adapter& adapter, const KernelRecord& record) {
 
 SpirvWords compileFunctions(Adapter& adapter, const KernelRecord& record, const fs::path& kernels) {
   refuseUnknownSlots(adapter, record);
-  if (!fs::is_regular_file(adapter.compute))
+  std::error_code error;
+  if (!fs::is_regular_file(adapter.compute, error))
     throw UsageError(fmt::format("{}: no such file", adapter.compute.string()));
   leaveOut(adapter, record);
   CompileOptions options = compileOptions(adapter, record, kernels);
   options.entryPoint = adapter.entry = "main";
   options.stage = ".comp";
-  return compileText(kernels / record.functions.file, entryAround(adapter, record, kernels),
-                     options);
+  const std::string text = entryAround(adapter, record, kernels);
+  try {
+    return compileText(kernels / record.functions.file, text, options);
+  } catch (const UsageError& error) {  // it may name our entry alone
+    throw UsageError(
+        fmt::format("{}: with its 'functions':\n{}", adapter.file.string(), error.what()));
+  }
 }
 
 SpirvWords compileAdapted(Adapter& adapter, const KernelRecord& record, const fs::path& kernels) {
@@ -100,6 +107,18 @@ SpirvWords compileAdapted(Adapter& adapter, const KernelRecord& record, const fs
   options.hlsl = language == "hlsl";
   options.stage = ".comp";  // whatever its ending: "files" said so
   return compileShader(adapter.compute, options);
+}
+
+/// Here, where the file is known.
+void refuseOtherEntries(const KernelModule& module) {
+  try {
+    const Reflection reflection = reflect(module.words, module.entryPoint);
+    if (reflection.stage != "compute")
+      throw UsageError(fmt::format("'{}' is a {} shader, not a compute shader", module.entryPoint,
+                                   reflection.stage));
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("{}: {}", module.origin, error.what()));
+  }
 }
 
 }  // namespace
@@ -120,6 +139,7 @@ KernelModule loadKernel(const fs::path& file, const KernelRecord& record, const 
     module.words = compileShader(file, options);
   }
   module.words = withoutImageFormats(module.words);
+  refuseOtherEntries(module);
   return module;
 }
 

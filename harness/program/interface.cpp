@@ -285,9 +285,12 @@ class Matcher {
   std::optional<Place> sameNamed(const std::string& where, const Field& ours,
                                  const ReflectedBinding& block) {
     const ReflectedMember* found = member(block.members, {}, ours.name);
+    if (found == nullptr)  // behind a header
+      found = member(block.members, {}, where + "." + ours.name);
     if (found == nullptr)
       for (const ReflectedMember& m : block.members)
-        if (m.path.find_first_not_of(".[]") == std::string::npos && m.offset == ours.offset)
+        if (m.path.find_first_not_of(".[]") == std::string::npos && m.offset == ours.offset &&
+            (block.name.empty() || fits(ours, m)))  // a bare array has a name, its element none
           found = &m;
     if (found == nullptr) {
       missing.push_back(
