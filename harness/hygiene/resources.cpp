@@ -140,8 +140,7 @@ void Resources::layOut() {
         const ModuleBuffer& buffer = interface.buffers[place->buffer];
         if (elements > 1 && (buffer.stride == 0 || place->offset < buffer.bytes))
           throw UsageError(fmt::format("{}: '{}' keeps one {}.{}, of which this case has {}",
-                                       origin, buffer.name, name, place->field.name,
-                                       elements));
+                                       origin, buffer.name, name, place->field.name, elements));
         std::size_t& held = memories[place->buffer].elements;
         held = std::max(held, elements);
       }

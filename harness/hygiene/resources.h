@@ -80,7 +80,8 @@ class Resources {
     const ModuleBuffer* spec = nullptr;
     std::size_t elements = 0;
     Bytes content{};  ///< what a run starts from; empty where that is all poison
-    std::vector<std::size_t> open{};  ///< bytes in content: words of outputs that nothing is given for
+    std::vector<std::size_t>
+        open{};  ///< bytes in content: words of outputs that nothing is given for
     std::vector<std::size_t> kept{};  ///< words of inputs that are no outputs
     std::size_t size = 0, before = 0, after = 0;
     GpuBuffer buffer{};

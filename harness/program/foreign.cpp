@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spirv_cross/spirv.hpp>
 
 #include "harness/error.h"
 #include "harness/program/compile.h"
@@ -83,8 +84,8 @@ void leaveOut(Adapter& adapter, const KernelRecord& record) {
 
 SpirvWords compileFunctions(Adapter& adapter, const KernelRecord& record, const fs::path& kernels) {
   refuseUnknownSlots(adapter, record);
-  std::error_code error;
-  if (!fs::is_regular_file(adapter.compute, error))
+  std::error_code ignored;
+  if (!fs::is_regular_file(adapter.compute, ignored))
     throw UsageError(fmt::format("{}: no such file", adapter.compute.string()));
   leaveOut(adapter, record);
   CompileOptions options = compileOptions(adapter, record, kernels);
@@ -109,6 +110,19 @@ SpirvWords compileAdapted(Adapter& adapter, const KernelRecord& record, const fs
   return compileShader(adapter.compute, options);
 }
 
+/// glslang makes an empty entry point where an HLSL file has none of that name.
+bool doesNothing(const SpirvWords& words) {
+  bool inFunction = false;
+  for (const SpirvInstruction& i : parseSpirv(words).instructions) {
+    inFunction = inFunction || i.opcode == spv::OpFunction;
+    if (inFunction && i.opcode != spv::OpFunction && i.opcode != spv::OpLabel &&
+        i.opcode != spv::OpLine && i.opcode != spv::OpNoLine && i.opcode != spv::OpReturn &&
+        i.opcode != spv::OpFunctionEnd)
+      return false;
+  }
+  return true;
+}
+
 /// Here, where the file is known.
 void refuseOtherEntries(const KernelModule& module) {
   try {
@@ -116,6 +130,10 @@ void refuseOtherEntries(const KernelModule& module) {
     if (reflection.stage != "compute")
       throw UsageError(fmt::format("'{}' is a {} shader, not a compute shader", module.entryPoint,
                                    reflection.stage));
+    if (doesNothing(module.words))
+      throw UsageError(
+          fmt::format("entry point '{}' is empty or not there; an adapter's 'entry' names another",
+                      module.entryPoint));
   } catch (const UsageError& error) {
     throw UsageError(fmt::format("{}: {}", module.origin, error.what()));
   }

@@ -95,8 +95,9 @@ class Matcher {
                                     fmt::join(fields, ", ")));
     for (const auto& [name, at] : adapter->bindings)
       if (!bound.contains(name))
-        lines.push_back(fmt::format("'bindings' puts '{}' at set {}, binding {}; the contract has {}",
-                                    name, at[0], at[1], fmt::join(bound, ", ")));
+        lines.push_back(
+            fmt::format("'bindings' puts '{}' at set {}, binding {}; the contract has {}", name,
+                        at[0], at[1], fmt::join(bound, ", ")));
   }
 
   bool named(const std::string& key) const {
@@ -177,8 +178,7 @@ class Matcher {
 
   /// Whether a member is there once for each element of its block's runtime array.
   static bool repeated(const ReflectedBinding* block, const ReflectedMember& m) {
-    return block != nullptr &&
-           (block->stride > 0 || (!m.arrays.empty() && m.arrays[0].count == 0));
+    return block != nullptr && (block->stride > 0 || (!m.arrays.empty() && m.arrays[0].count == 0));
   }
 
   /// A member by its path, below its binding's name or not.
@@ -553,8 +553,8 @@ class Matcher {
 
   void resizeGroup(unsigned axis, double value) {
     if (value < 1 || value > kMostThreads) {
-      lines.push_back(fmt::format("'specialization' makes a group of {} threads on axis {}", value,
-                                  axis));
+      lines.push_back(
+          fmt::format("'specialization' makes a group of {} threads on axis {}", value, axis));
       return;
     }
     const auto threads = static_cast<unsigned>(value);

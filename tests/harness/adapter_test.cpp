@@ -114,8 +114,7 @@ TEST(Adapter, AnUnknownKeyIsAnsweredWithTheKeys) {
 TEST(Adapter, AValueOfTheWrongKindIsNamedWithWhatItIs) {
   const char* const cases[][3] = {
       {"language", "3", "'language' must be a text, not 3"},
-      {"language", "\"cg\"",
-       "'language' must be \"glsl\", \"hlsl\" or \"spirv\", not \"cg\""},
+      {"language", "\"cg\"", "'language' must be \"glsl\", \"hlsl\" or \"spirv\", not \"cg\""},
       {"files", "\"a.comp\"", "'files' must be an object, not \"a.comp\""},
       {"files", "{\"comp\": 1}", "'files.comp' must be a text, not 1"},
       {"entry", "null", "'entry' must be a text, not null"},
@@ -165,8 +164,8 @@ TEST(Adapter, FilesNeedAComputeShader) {
 TEST(Adapter, AFileThatIsMissingOrHugeIsNamed) {
   EXPECT_EQ(refusal(std::string((1u << 20) + 1, ' ')), "larger than 1048576 bytes");
   const Scratch scratch;
-  for (const fs::path& file : {scratch.folder / "none.json", scratch.folder,
-                               scratch.folder / std::string(300, 'x')})
+  for (const fs::path& file :
+       {scratch.folder / "none.json", scratch.folder, scratch.folder / std::string(300, 'x')})
     try {
       readAdapter(file);
       ADD_FAILURE() << file;

@@ -54,20 +54,19 @@ struct Push {
 };
 
 KernelRecord record() {
-  return {.stage = "test",
-          .entry = "copy",
-          .file = "",
-          .buffers = {{"items", 0, Access::kRead,
-                       describe<Item>("Item", field("a", &Item::a),
-                                      field("r", &Item::r, "roughness"), field("k", &Item::k),
-                                      field("m", &Item::m))},
-                      {"copies", 1, Access::kWrite,
-                       describe<Copy>("Copy", field("a", &Copy::a),
-                                      field("r", &Copy::r), field("k", &Copy::k),
-                                      field("m", &Copy::m))}},
-          .push = describe<Push>("Push", field("count", &Push::count)),
-          .features = {"scalarBlockLayout"},
-          .conventions = {{"roughness", {"perceptual", "alpha"}}}};
+  return {
+      .stage = "test",
+      .entry = "copy",
+      .file = "",
+      .buffers = {{"items", 0, Access::kRead,
+                   describe<Item>("Item", field("a", &Item::a), field("r", &Item::r, "roughness"),
+                                  field("k", &Item::k), field("m", &Item::m))},
+                  {"copies", 1, Access::kWrite,
+                   describe<Copy>("Copy", field("a", &Copy::a), field("r", &Copy::r),
+                                  field("k", &Copy::k), field("m", &Copy::m))}},
+      .push = describe<Push>("Push", field("count", &Push::count)),
+      .features = {"scalarBlockLayout"},
+      .conventions = {{"roughness", {"perceptual", "alpha"}}}};
 }
 
 constexpr std::size_t kCount = 77;  // two groups of 32 and a part of one
@@ -87,12 +86,15 @@ const std::string kHead = R"(#version 450
 layout(local_size_x = 32) in;
 )";
 const std::string kPush = "layout(push_constant) uniform P { uint count; };\n";
-const std::string kMain = "void main() {\n  uint i = gl_GlobalInvocationID.x;\n"
-                          "  if (i >= count) return;\n";
+const std::string kMain =
+    "void main() {\n  uint i = gl_GlobalInvocationID.x;\n"
+    "  if (i >= count) return;\n";
 
 class Foreign : public testing::Test {
  protected:
-  static void SetUpTestSuite() { gpu = std::make_unique<Gpu>(Gpu::Options{.device = "", .validation = true}); }
+  static void SetUpTestSuite() {
+    gpu = std::make_unique<Gpu>(Gpu::Options{.device = "", .validation = true});
+  }
   static void TearDownTestSuite() { gpu.reset(); }
   void SetUp() override { fs::create_directories(folder); }
   void TearDown() override { fs::remove_all(folder); }
@@ -227,7 +229,8 @@ TEST_F(Foreign, ABlockThatHoldsOneElementIsRefusedForMany) {
   try {
     ran(R"(layout(binding = 0, scalar) readonly buffer A { vec3 a; float r; uint k; mat3 m; } items;
 layout(binding = 1, scalar) buffer B { vec3 copies[]; };
-)" + kPush + kMain + "copies[i] = items.a; }",
+)" + kPush + kMain +
+            "copies[i] = items.a; }",
         Adapter{.fields = {{"copies.a", "copies"}}});
     FAIL();
   } catch (const UsageError& error) {
@@ -252,9 +255,9 @@ TEST_F(Foreign, AWritePastTheEndIsFound) {
 }
 
 TEST_F(Foreign, AWriteIntoTheInputIsFoundByTheContractsName) {
-  const Observation o = ran(
-      kTheirs + kPush + kMain + "copies[i] = things[i]; if (i == 5u) things[i].k = 1u; }",
-      kTheirsAdapter);
+  const Observation o =
+      ran(kTheirs + kPush + kMain + "copies[i] = things[i]; if (i == 5u) things[i].k = 1u; }",
+          kTheirsAdapter);
   EXPECT_TRUE(finds(o, "wrote into its input, at items[5].k")) << all(o);
 }
 
@@ -263,7 +266,8 @@ TEST_F(Foreign, OutputsThatAreNotGivenAreListedAndNotMissed) {
 layout(binding = 0, scalar) readonly buffer A { Item items[]; };
 layout(binding = 1, std430) writeonly buffer B { uint k[]; };
 )" + kPush + kMain + "k[i] = items[i].k; }",
-                            Adapter{.bindings = {{"copies", {0, 1}}}, .fields = {{"copies.k", "k"}}});
+                            Adapter{.bindings = {{"copies", {0, 1}}},
+                                    .fields = {{"copies.k", "k"}}});
   EXPECT_TRUE(o.findings.empty()) << all(o);
   EXPECT_EQ(o.unmapped, (std::set<std::string>{"copies.a", "copies.m", "copies.r"}));
   const auto copies = elementsOf<Copy>(o.plain.at("copies"));
@@ -277,8 +281,9 @@ TEST_F(Foreign, AlphaIsTheSquareOfRoughnessAndStaysSane) {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   constexpr float kMax = std::numeric_limits<float>::max();
   const std::vector<std::pair<float, float>> table = {
-      {0.0f, 0.0f}, {-0.0f, -0.0f},    {0.5f, 0.25f}, {1.0f, 1.0f}, {-0.5f, -0.25f}, {3.0f, 9.0f},
-      {kInf, kInf}, {-kInf, -kInf},    {1e30f, kMax}, {-1e30f, -kMax}, {kMax, kMax}, {1e-30f, 0.0f}};
+      {0.0f, 0.0f},    {-0.0f, -0.0f},  {0.5f, 0.25f}, {1.0f, 1.0f},
+      {-0.5f, -0.25f}, {3.0f, 9.0f},    {kInf, kInf},  {-kInf, -kInf},
+      {1e30f, kMax},   {-1e30f, -kMax}, {kMax, kMax},  {1e-30f, 0.0f}};
   std::vector<Item> items(table.size() + 1);
   for (std::size_t i = 0; i < table.size(); ++i) items[i].r = table[i].first;
   items.back().r = std::bit_cast<float>(0x7fc01234u);
@@ -333,19 +338,18 @@ void main() {
   depths[8] = 1e38f;
   for (const bool foreign : {true, false}) {
     const fs::path file =
-        write("picture.json", fmt::format(R"({{"files": {{"comp": "picture.comp"}}{}}})",
-                                          foreign ? R"(, "conventions": {"y": "up", "depth": "standard"})"
-                                                  : ""));
+        write("picture.json",
+              fmt::format(R"({{"files": {{"comp": "picture.comp"}}{}}})",
+                          foreign ? R"(, "conventions": {"y": "up", "depth": "standard"})" : ""));
     const KernelRecord r = pictures();
     const Subject subject(*gpu, r, loadKernel(file, r, folder));
-    const Observation o =
-        observe(subject, {.inputImages = {{"source",
-                                           {.format = PixelFormat::kR32f,
-                                            .width = kWidth,
-                                            .height = kHeight},
-                                           std::as_bytes(std::span(depths))}},
-                          .outputImages = {{"target", kWidth, kHeight}},
-                          .extent = {kWidth, kHeight}});
+    const Observation o = observe(
+        subject,
+        {.inputImages = {{"source",
+                          {.format = PixelFormat::kR32f, .width = kWidth, .height = kHeight},
+                          std::as_bytes(std::span(depths))}},
+         .outputImages = {{"target", kWidth, kHeight}},
+         .extent = {kWidth, kHeight}});
     EXPECT_TRUE(o.findings.empty()) << all(o);
     const auto pixels = elementsOf<vec4>(o.plain.at("target"));
     for (unsigned i = 0; i < kWidth * kHeight; ++i) {
@@ -384,7 +388,8 @@ TEST_F(Foreign, AnHlslEntryPointIsLoadedAndRuns) {
 
 /// The record with an entry point around somebody's functions.
 KernelRecord callingRecord(const fs::path& folder) {
-  std::ofstream(folder / "entry.glsl") << kHead + R"(#extension GL_GOOGLE_include_directive : require
+  std::ofstream(folder / "entry.glsl") << kHead +
+                                              R"(#extension GL_GOOGLE_include_directive : require
 #include "FUNCTIONS"
 struct Item { vec3 a; float r; uint k; mat3 m; };
 layout(binding = 0, scalar) readonly buffer A { Item items[]; };
@@ -466,16 +471,18 @@ TEST_F(Foreign, JunkIsRefusedWithItsName) {
 }
 
 TEST_F(Foreign, AnEntryPointThatIsMissingOrNoComputeShaderIsNamedWithItsFile) {
-  const std::string text = "[numthreads(8, 1, 1)] void CSMain() {}\n";
+  const std::string text =
+      "RWStructuredBuffer<uint> to; [numthreads(8, 1, 1)] void CSMain() { to[0] = 1; }\n";
   EXPECT_EQ(refusal(write("a.hlsl", text)),
             (folder / "a.hlsl").string() +
-                ": compiles to invalid SPIR-V");
+                ": entry point 'main' is empty or not there; an adapter's 'entry' names another");
   const std::string vertex = "#version 450\nvoid main() { gl_Position = vec4(0); }\n";
   EXPECT_EQ(refusal(write("a.vert", vertex)),
             (folder / "a.vert").string() + ": 'main' is a vertex shader, not a compute shader");
   const SpirvWords words = compileText(vertex, ".vert");
-  EXPECT_EQ(refusal(write("a.spv", {reinterpret_cast<const char*>(words.data()), 4 * words.size()})),
-            (folder / "a.spv").string() + ": 'main' is a vertex shader, not a compute shader");
+  EXPECT_EQ(
+      refusal(write("a.spv", {reinterpret_cast<const char*>(words.data()), 4 * words.size()})),
+      (folder / "a.spv").string() + ": 'main' is a vertex shader, not a compute shader");
 }
 
 // ---- hostile SPIR-V -------------------------------------------------------------------------
@@ -526,7 +533,8 @@ std::vector<SpirvWords> manyModules() {
       compileText(kHead + R"(struct Item { vec3 a; float r; uint k; mat3 m; };
 layout(binding = 0, scalar) buffer A { Item items[]; };
 layout(binding = 1, scalar) buffer B { Item copies[]; };
-)" + kPush + kMain + "copies[i] = items[i]; }")};
+)" + kPush + kMain +
+                  "copies[i] = items[i]; }")};
   for (const fs::path& file : files)
     modules.push_back(compileShader(file, {.includeFolders = {kernels}}));
   return modules;
@@ -592,8 +600,8 @@ void workThrough(const std::vector<SpirvWords>& modules, Progress& progress) {
 TEST_F(Foreign, HostileModulesEndInAnErrorOrAnAnswer) {
   const std::vector<SpirvWords> modules = manyModules();
   ASSERT_GT(modules.size(), 5u);
-  void* shared = mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE,
-                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* shared =
+      mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(shared, MAP_FAILED);
   Progress& progress = *new (shared) Progress;
   std::vector<std::string> deaths;
@@ -612,10 +620,9 @@ TEST_F(Foreign, HostileModulesEndInAnErrorOrAnAnswer) {
     int status = 0;
     ASSERT_EQ(waitpid(child, &status, 0), child);
     if (progress.next >= kCopies) break;
-    deaths.push_back(fmt::format("copy {} of module {} in {}: {}", progress.next,
-                                 progress.next % modules.size(), progress.step,
-                                 WIFSIGNALED(status) ? strsignal(WTERMSIG(status))
-                                                     : "another exception"));
+    deaths.push_back(fmt::format(
+        "copy {} of module {} in {}: {}", progress.next, progress.next % modules.size(),
+        progress.step, WIFSIGNALED(status) ? strsignal(WTERMSIG(status)) : "another exception"));
     ++progress.next;
   }
   EXPECT_TRUE(deaths.empty()) << fmt::format("{}", fmt::join(deaths, "\n"));

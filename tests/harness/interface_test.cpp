@@ -152,25 +152,25 @@ layout(set = 1, binding = 9, std430) buffer B1 { Lit results[]; };)"),
 }
 
 TEST(Interface, ARowMajorMatrixIsKnownForOne) {
-  const Interface i =
-      mapped(module(kLit + kPush + R"(struct Q { vec3 a; float r; uint k; mat3 m; };
-layout(binding = 0, std430, row_major) buffer B0 { Q points[]; };)" + kResults), Adapter{});
+  const Interface i = mapped(module(kLit + kPush + R"(struct Q { vec3 a; float r; uint k; mat3 m; };
+layout(binding = 0, std430, row_major) buffer B0 { Q points[]; };)" +
+                                    kResults),
+                             Adapter{});
   EXPECT_TRUE(i.placesOf("points")[3]->rowMajor);
 }
 
 TEST(Interface, FieldsMayBeScatteredAndBeComponents) {
-  const Interface i = mapped(
-      module(kPush + R"(struct Item { vec4 ar; ivec2 k; };
+  const Interface i = mapped(module(kPush + R"(struct Item { vec4 ar; ivec2 k; };
 layout(set = 0, binding = 3, std430) buffer B0 { Item items[]; };
 layout(set = 0, binding = 4, std430) buffer B1 { uint n; mat3 turns[]; };
 layout(set = 0, binding = 5, std430) buffer B2 { vec4 colour[]; };
 layout(set = 0, binding = 6, std430) buffer B3 { float D[]; };)"),
-      Adapter{.fields = {{"points.a", "items[].ar"},
-                         {"points.r", "ar.w"},
-                         {"points.k", "items.k.y"},
-                         {"points.m", "B1.turns"},
-                         {"results.D", "D"},
-                         {"results.F", "colour.y"}}});
+                             Adapter{.fields = {{"points.a", "items[].ar"},
+                                                {"points.r", "ar.w"},
+                                                {"points.k", "items.k.y"},
+                                                {"points.m", "B1.turns"},
+                                                {"results.D", "D"},
+                                                {"results.F", "colour.y"}}});
   EXPECT_EQ(places(i, "points"), (Lines{"items@0", "items@12", "items@20", "B1@16"}));
   EXPECT_EQ(places(i, "results"), (Lines{"D@0", "colour@4"}));
   EXPECT_EQ(i.buffers[1].stride, 48u);  // behind a header of 16 bytes
@@ -214,9 +214,9 @@ layout(set = 3, binding = 0, std140) uniform Params { vec3 tint; uint count; flo
             Lines{"'constants' gives 2 of the 3 components of 'tint'"});
   const std::string plain = R"(
 layout(set = 3, binding = 0, std140) uniform Params { uint count; float bias; float scale; } p;)";
-  const Interface i = mapped(module(kPoint + kLit + kPoints + kResults + plain),
-                             Adapter{.fields = {{"push.gain", "p.scale"}},
-                                     .constants = {{"p.bias", -0.5}}});
+  const Interface i =
+      mapped(module(kPoint + kLit + kPoints + kResults + plain),
+             Adapter{.fields = {{"push.gain", "p.scale"}}, .constants = {{"p.bias", -0.5}}});
   EXPECT_EQ(pushes(i), (Lines{"count:p@0", "gain:p@8"}));
   ASSERT_EQ(i.presets.size(), 1u);
   EXPECT_EQ(i.presets[0].offset, 4u);
@@ -227,8 +227,9 @@ layout(set = 3, binding = 0, std140) uniform Params { uint count; float bias; fl
 // ---- constants, groups ----------------------------------------------------------------------
 
 TEST(Interface, SpecializationIsByNameOrIdAndResizesTheGroup) {
-  const std::string constants = "layout(constant_id = 3) const float bias = 0;\n"
-                                "layout(constant_id = 4) const int turns = 0;\n";
+  const std::string constants =
+      "layout(constant_id = 3) const float bias = 0;\n"
+      "layout(constant_id = 4) const int turns = 0;\n";
   const SpirvWords words = module(constants + kOurs, kStore + "results[1].D = bias + turns;",
                                   "local_size_x_id = 0, local_size_y_id = 7");
   KernelRecord r = record();
@@ -242,10 +243,9 @@ TEST(Interface, SpecializationIsByNameOrIdAndResizesTheGroup) {
 }
 
 TEST(Interface, AGridSaysWhatAGroupCoversWhateverItsThreads) {
-  const Interface i = mapped(module(kOurs, kStore, "local_size_x_id = 0"),
-                             Adapter{.specialization = {{"0", 16}},
-                                     .grid = std::array{64u, 1u, 1u},
-                                     .conventions = {}});
+  const Interface i = mapped(
+      module(kOurs, kStore, "local_size_x_id = 0"),
+      Adapter{.specialization = {{"0", 16}}, .grid = std::array{64u, 1u, 1u}, .conventions = {}});
   EXPECT_EQ(i.groupSize[0], 16u);
   EXPECT_EQ(i.covered[0], 64u);
 }
@@ -269,15 +269,16 @@ layout(binding = 1, std430) buffer B1 { Half results[]; };)";
 // ---- contradictions -------------------------------------------------------------------------
 
 TEST(Interface, WithoutAnAdapterEveryDifferenceIsALine) {
-  EXPECT_EQ(contradictions(module(kPush + kLit + kResults + R"(
+  EXPECT_EQ(
+      contradictions(module(kPush + kLit + kResults + R"(
 struct Q { vec3 a; int r; uint spare; uint k; };
 layout(set = 1, binding = 2, scalar) buffer B0 { Q points[]; };)")),
-            (Lines{"'points' is at set 1, binding 2 in the shader, set 0, binding 0 in the contract",
-                   "an element of 'points' takes 24 bytes in the shader, 56 in the contract",
-                   "points.r is int in the shader, float in the contract",
-                   "points.k is at byte 20 in the shader, 16 in the contract",
-                   "points has no member 'm' in the shader; the contract has mat3 m at byte 20",
-                   "points.spare (uint) stands in the shader but not in the contract"}));
+      (Lines{"'points' is at set 1, binding 2 in the shader, set 0, binding 0 in the contract",
+             "an element of 'points' takes 24 bytes in the shader, 56 in the contract",
+             "points.r is int in the shader, float in the contract",
+             "points.k is at byte 20 in the shader, 16 in the contract",
+             "points has no member 'm' in the shader; the contract has mat3 m at byte 20",
+             "points.spare (uint) stands in the shader but not in the contract"}));
 }
 
 TEST(Interface, BuffersAndPushConstantsThatDoNotAgreeAreNamed) {
@@ -373,15 +374,16 @@ TEST(Interface, ConstantsThatNobodyHasOrThatAreMappedAreNamed) {
 TEST(Interface, NumbersThatAParameterCannotBeAreRefused) {
   const SpirvWords words = module(
       "layout(constant_id = 1) const bool fast = true;\n"
-      "layout(constant_id = 2) const double wide = 1;\n" + kPoint + kLit + kPoints + kResults + R"(
+      "layout(constant_id = 2) const double wide = 1;\n" +
+          kPoint + kLit + kPoints + kResults + R"(
 layout(binding = 8, std140) uniform Params { uint count; float gain; uint n; int i; float f; vec3 v; };)",
       "results[0].D = fast ? 1 : float(wide);", "local_size_x_id = 0");
   const auto with = [&](std::map<std::string, double> constants,
                         std::map<std::string, double> specialization = {}) {
     std::map<std::string, double> all = {{"n", 1}, {"i", 1}, {"f", 1}};
     constants.merge(all);
-    Lines lines = contradictions(
-        words, Adapter{.specialization = specialization, .constants = constants});
+    Lines lines =
+        contradictions(words, Adapter{.specialization = specialization, .constants = constants});
     std::erase_if(lines, [](const std::string& l) { return l.starts_with("nothing gives"); });
     return lines;
   };
@@ -395,8 +397,7 @@ layout(binding = 8, std140) uniform Params { uint count; float gain; uint n; int
   EXPECT_EQ(with({{"points.r", 1}}).size(), 1u);
   EXPECT_EQ(with({}, {{"fast", 2}}), Lines{s + "fast' the number 2, but it is bool in the shader"});
   EXPECT_EQ(with({}, {{"2", 0.5}}), Lines{s + "2' the number 0.5, but it is double in the shader"});
-  EXPECT_EQ(with({}, {{"0", 0}}),
-            Lines{"'specialization' makes a group of 0 threads on axis 0"});
+  EXPECT_EQ(with({}, {{"0", 0}}), Lines{"'specialization' makes a group of 0 threads on axis 0"});
   EXPECT_EQ(with({}, {{"0", -8}}), Lines{s + "0' the number -8, but it is uint in the shader"});
 }
 
