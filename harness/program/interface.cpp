@@ -437,7 +437,8 @@ class Matcher {
 
   void takeConstants() {
     if (adapter == nullptr) return;
-    for (const auto& [key, value] : adapter->constants) {
+    for (const auto& [name, value] : adapter->constants) {
+      const std::string& key = name;  // what a lambda may capture
       if (presetNamed(key, value)) continue;
       const auto push = std::ranges::find(record.push.fields, key, &Field::name);
       if (push == record.push.fields.end()) {
@@ -535,7 +536,8 @@ class Matcher {
 
   void takeSpecialization() {
     if (adapter == nullptr) return;
-    for (const auto& [key, value] : adapter->specialization) {
+    for (const auto& [name, value] : adapter->specialization) {
+      const std::string& key = name;  // what a lambda may capture
       const auto found = std::ranges::find_if(module.constants, [&](const ReflectedConstant& c) {
         return (!c.name.empty() && c.name == key) || std::to_string(c.id) == key;
       });
