@@ -166,7 +166,7 @@ TEST_F(Foreign, ValuesSurviveEveryPacking) {
     expectCopied(ran(fmt::format(R"(
 struct Item {{ vec3 a; float r; uint k; mat3 m; }};
 layout(set = 2, binding = 3, {0}) readonly buffer A {{ Item items[]; }};
-layout(set = 1, binding = 0, {0}) writeonly buffer B {{ Item copies[]; }};
+layout(set = 1, binding = 0, scalar) writeonly buffer B {{ Item copies[]; }};
 {1}{2} copies[i] = items[i]; }})",
                                  packing, kPush, kMain),
                      Adapter{}));
@@ -342,7 +342,9 @@ void main() {
               fmt::format(R"({{"files": {{"comp": "picture.comp"}}{}}})",
                           foreign ? R"(, "conventions": {"y": "up", "depth": "standard"})" : ""));
     const KernelRecord r = pictures();
-    const Subject subject(*gpu, r, loadKernel(file, r, folder));
+    KernelModule module = loadKernel(file, r, folder);
+    EXPECT_FALSE(says(disassemble(module.words), "Rgba8"));  // lavapipe would overlook it
+    const Subject subject(*gpu, r, std::move(module));
     const Observation o = observe(
         subject,
         {.inputImages = {{"source",
