@@ -45,7 +45,7 @@ struct Difference {
 void checkWords(std::vector<std::string>& findings, const Output& out,
                 std::span<const std::byte> first, std::span<const std::byte> second,
                 bool deterministic, const std::string& module) {
-  if (std::memcmp(first.data(), second.data(), first.size()) == 0) return;
+  if (std::ranges::equal(first, second)) return;
   Difference unwritten, differing;
   const std::size_t perElement = out.layout.size / kWord;
   for (std::size_t i = 0; i < first.size() / kWord; ++i) {

@@ -124,13 +124,13 @@ bool doesNothing(const SpirvWords& words) {
 }
 
 /// Here, where the file is known.
-void refuseOtherEntries(const KernelModule& module) {
+void refuseOtherEntries(const KernelModule& module, bool hlsl) {
   try {
     const Reflection reflection = reflect(module.words, module.entryPoint);
     if (reflection.stage != "compute")
       throw UsageError(fmt::format("'{}' is a {} shader, not a compute shader", module.entryPoint,
                                    reflection.stage));
-    if (doesNothing(module.words))
+    if (hlsl && doesNothing(module.words))
       throw UsageError(
           fmt::format("entry point '{}' is empty or not there; an adapter's 'entry' names another",
                       module.entryPoint));
@@ -144,20 +144,22 @@ void refuseOtherEntries(const KernelModule& module) {
 KernelModule loadKernel(const fs::path& file, const KernelRecord& record, const fs::path& kernels) {
   KernelModule module{.origin = file.string()};
   const std::string ending = file.extension().string();
+  bool isHlsl = ending == ".hlsl";
   if (ending == ".json") {
     module.adapter = readAdapter(file);
+    isHlsl = module.adapter->functions.empty() && languageOf(*module.adapter) == "hlsl";
     module.words = compileAdapted(*module.adapter, record, kernels);
     module.entryPoint = module.adapter->entry;
   } else if (ending == ".spv") {
     module.words = validSpirv(file);
   } else {
     CompileOptions options = compileOptions({}, record, kernels);
-    options.hlsl = ending == ".hlsl";
-    if (options.hlsl) options.stage = ".comp";
+    options.hlsl = isHlsl;
+    if (isHlsl) options.stage = ".comp";
     module.words = compileShader(file, options);
   }
   module.words = withoutImageFormats(module.words);
-  refuseOtherEntries(module);
+  refuseOtherEntries(module, isHlsl);
   return module;
 }
 
