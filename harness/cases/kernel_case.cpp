@@ -8,6 +8,7 @@
 
 #include "harness/cases/hash.h"
 #include "harness/error.h"
+#include "harness/hygiene/pack.h"
 
 namespace gnomon {
 
@@ -49,6 +50,13 @@ bool KernelCase::applies(std::span<const std::byte> push) {
   });
   if (!all) ++left;
   return all;
+}
+
+void KernelCase::recover(Picture& picture, const std::string& meaning) {
+  const Conventions& conventions = Session::current().subject(kernelName).conventions();
+  for (vec4& texel : picture.texels)
+    texel.x = converted(converted(texel.x, meaning, conventions, Way::kIn), meaning, conventions,
+                        Way::kOut);
 }
 
 void KernelCase::TearDown() {

@@ -128,7 +128,8 @@ std::string contentOf(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Everything that a result depends on. Two runs with the same one may share results.
+/// What a result depends on, but for the files of data/ that cases read. Two runs with the same one
+/// may share results.
 std::string fingerprint(const ValidateOptions& o, const Preparation& prepared) {
   const SessionOptions& s = o.session;
   return nlohmann::json{{"stages", o.selection.stages},

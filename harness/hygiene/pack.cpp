@@ -68,9 +68,9 @@ Bytes inConvention(std::span<const std::byte> rows, PixelFormat format, unsigned
     for (unsigned y = 0; y < height; ++y)
       std::memcpy(result.data() + y * rowBytes, rows.data() + (height - 1 - y) * rowBytes,
                   rowBytes);
-  const bool floats = format == PixelFormat::kD32 || format == PixelFormat::kR32f;
-  if (meaning == "depth" && floats && !conventions.empty())
-    for (std::size_t at = 0; at < result.size(); at += kWord) {
+  const bool floats = bytesPerPixel(format) == kWord * channels(format);
+  if (meaning == "depth" && floats && !conventions.empty())  // the first channel is the depth
+    for (std::size_t at = 0; at < result.size(); at += bytesPerPixel(format)) {
       float x = 0;
       std::memcpy(&x, result.data() + at, kWord);
       x = converted(x, meaning, conventions, way);

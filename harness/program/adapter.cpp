@@ -109,12 +109,9 @@ std::string language(const Value& value) {
 
 fs::path computeFile(const Value& value, const fs::path& folder) {
   const auto files = value.members<std::string>([](const Value& v) { return v.text(); });
-  for (const auto& [stage, name] : files)
-    if (stage != "comp" && stage != "vert" && stage != "frag")
-      throw value.wrong("an object of comp, vert and frag");
   const auto comp = files.find("comp");
-  if (comp == files.end())
-    throw value.wrong("an object with comp: entries that draw are not there yet");
+  if (comp == files.end() || files.size() != 1)
+    throw value.wrong("an object with comp alone: entries that draw are not there yet");
   return folder / comp->second;
 }
 

@@ -77,9 +77,13 @@ std::string entryAround(const Adapter& adapter, const KernelRecord& record,
 
 /// A slot that is not given leaves an output out, or its push constant at 0.
 void leaveOut(Adapter& adapter, const KernelRecord& record) {
-  for (const FunctionSlot& slot : record.functions.slots)
-    if (!slot.push.empty() && !adapter.functions.contains(slot.name))
-      adapter.constants[slot.push] = 0;
+  for (const FunctionSlot& slot : record.functions.slots) {
+    if (slot.push.empty() || adapter.functions.contains(slot.name)) continue;
+    const auto [given, isNew] = adapter.constants.try_emplace(slot.push, 0);
+    if (given->second != 0)
+      throw UsageError(fmt::format("{}: 'constants' gives {} {}, but 'functions' gives no {}",
+                                   adapter.file.string(), slot.push, given->second, slot.name));
+  }
 }
 
 SpirvWords compileFunctions(Adapter& adapter, const KernelRecord& record, const fs::path& kernels) {

@@ -475,9 +475,9 @@ class Matcher {
 
   Found parameterAt(const std::string& path) const {
     if (const Found whole = wholeParameterAt(path); whole.member != nullptr) return whole;
+    if (path.size() < 3 || path[path.size() - 2] != '.') return {};
     const std::size_t component = std::string_view("xyzwrgba").find(path.back());
-    if (path.size() < 3 || path[path.size() - 2] != '.' || component == std::string_view::npos)
-      return {};
+    if (component == std::string_view::npos) return {};
     Found found = wholeParameterAt(path.substr(0, path.size() - 2));
     if (found.member == nullptr || found.member->matrixStride > 0 ||
         component % 4 >= components(found.member->type))

@@ -257,6 +257,7 @@ class Judge {
     const auto& [spec, forPlain, device] = allowed;
     bool outSpec = false, outDevice = false, moved = false, ambiguous = false;
     std::vector<char> fieldOut(result.fields.size(), 0);
+    std::optional<Offender> plainHere;
     for (std::size_t s = 0; s < scalars.size(); ++s) {
       const double got = twin(i, scalars[s]), gotPlain = plain(i, scalars[s]);
       const double bySpec = budgetUsed(got, spec[s], scalars[s].signOfZero);
@@ -273,9 +274,14 @@ class Judge {
       field.budget = std::max(field.budget, byDevice);
       keepWorse(field.worst, {i, scalars[s].name, got, gotPlain, device[s].value, device[s].lo,
                               device[s].hi, byDevice});
-      keepWorse(worstPlain, {i, scalars[s].name, got, gotPlain, forPlain[s].value, forPlain[s].lo,
-                             forPlain[s].hi, byPlain});
+      keepWorse(plainHere, {i, scalars[s].name, got, gotPlain, forPlain[s].value, forPlain[s].lo,
+                            forPlain[s].hi, byPlain});
       result.plainBudget = std::max(result.plainBudget, byPlain);
+    }
+    // Where the twin is outside, both are asked of the widened bound.
+    if (!outSpec && plainHere) {
+      plainNearby = std::max(plainNearby, plainHere->budget);
+      keepWorse(worstPlain, *plainHere);
     }
     for (std::size_t f = 0; f < fieldOut.size(); ++f)
       result.fields[f].outside += fieldOut[f] ? 1 : 0;
@@ -331,21 +337,22 @@ class Judge {
     for (const FieldVerdict& f : result.fields)
       if (f.worst) keepWorse(result.worst, *f.worst);
     if (result.outside > 0) {
-      result.widening = smallestWidening();
+      // What was left alone cannot be excused.
+      result.widening = result.truncated ? 0 : smallestWidening();
       result.verdict = result.widening > 0 ? Class::kEquivalent : Class::kWrong;
     }
-    if (result.outside == 0) requirePlainNearby();
+    if (result.verdict != Class::kWrong) requirePlainNearby();
     requireNarrowBounds();
     if (!result.problems.empty()) result.verdict = Class::kWrong;
   }
 
   void requirePlainNearby() {
-    if (result.plainBudget > policy["plainBudget"]) {
+    if (plainNearby > policy["plainBudget"]) {
       result.worst = worstPlain;
       result.problems.push_back(fmt::format(
           "the strict twin is inside, but the module as it is uses {:.3g} budgets where "
           "at most {:.0f} can be rearrangement",
-          result.plainBudget, policy["plainBudget"]));
+          plainNearby, policy["plainBudget"]));
     }
   }
 
@@ -384,6 +391,10 @@ class Judge {
     std::vector<Bounded> allowed(scalars.size());
     evaluate(rules(), i, allowed);
     ambiguous += std::ranges::any_of(allowed, &Bounded::ambiguous);
+    // Widened out of an operation's domain, anything would be inside.
+    if (std::ranges::any_of(allowed,
+                            [](const Bounded& b) { return b.unspecified() || b.notJudged(); }))
+      return false;
     store(allowed);
     for (std::size_t s = 0; s < scalars.size(); ++s) {
       const double got = twin(i, scalars[s]);
@@ -406,6 +417,7 @@ class Judge {
   std::vector<Widths> widths;
   std::vector<std::size_t> offenders;
   std::optional<Offender> worstPlain;
+  double plainNearby = 0;  // worst of the module as it is, where its twin is inside
   bool unspecifiedSeen = false;
   std::mutex mutex;
   Verdict result;

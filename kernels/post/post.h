@@ -22,7 +22,7 @@ struct Views {  // push constants
   vec4 splits;  // view depth at which each cascade ends, ascending, the last one far
 };
 
-const uint kAlbedo = 0;  // seed 000's GBufferViewMode, of which 11 is fixed
+const uint kAlbedo = 0;  // 3 to 10 are left to views of other targets
 const uint kNormal = 1;
 const uint kDepth = 2;
 const uint kCascades = 11;
@@ -31,10 +31,10 @@ const vec3 kCascadeColour0 = vec3(0, 1, 0);  // green, blue, yellow, red
 const vec3 kCascadeColour1 = vec3(0, 0, 1);
 const vec3 kCascadeColour2 = vec3(1, 1, 0);
 const vec3 kCascadeColour3 = vec3(1, 0, 0);
-const float kCascadeTint = 0.7f;     // of the colour, over
-const float kCascadeDim = 0.3f;      // of the albedo
-const float kCascadeBlend = 0.1f;    // the last tenth of a cascade's depth range blends into the
-const float kBlendBrighter = 1.25f;  // next cascade and is brightened; not after the last one
+const float kCascadeTint = 0.7f;   // of the colour, over
+const float kCascadeDim = 0.3f;    // of the albedo
+const float kCascadeBlend = 0.1f;  // the last tenth of a cascade's depth range, where shadows blend
+const float kBlendBrighter = 1.25f;  // into the next one, is brightened; not of the last cascade
 
 const uint kAlbedoImage = 0;  // binding numbers, set 0: texture2D, RGBA8 in a frame
 const uint kNormalImage = 1;  // texture2D, RGBA16F in a frame

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 const std::string kGood = R"json({
   "language": "glsl",
-  "files": {"comp": "sub/kernel.comp", "vert": "unused.vert"},
+  "files": {"comp": "sub/kernel.comp"},
   "entry": "shade",
   "include": ["lib", "../shared"],
   "defines": {"FAST": "1", "NAME": ""},
@@ -154,10 +154,10 @@ TEST(Adapter, NumbersThatNoBindingOrGroupHasAreRefused) {
 TEST(Adapter, FilesNeedAComputeShader) {
   EXPECT_EQ(refusal("{}"), "it names no \"files\"");
   EXPECT_EQ(refusalOf("files", "{\"vert\": \"a.vert\", \"frag\": \"a.frag\"}"),
-            "'files' must be an object with comp: entries that draw are not there yet, not "
+            "'files' must be an object with comp alone: entries that draw are not there yet, not "
             "{\"frag\":\"a.frag\",\"vert\":\"a.vert\"}");
   EXPECT_EQ(refusalOf("files", "{\"comp\": \"a.comp\", \"geom\": \"a.geom\"}"),
-            "'files' must be an object of comp, vert and frag, not "
+            "'files' must be an object with comp alone: entries that draw are not there yet, not "
             "{\"comp\":\"a.comp\",\"geom\":\"a.geom\"}");
 }
 
