@@ -1,0 +1,53 @@
+// Debug views over a depth buffer of standard Z: 0 at the near plane, 1 at the far one and in the
+// sky.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_shader_image_load_formatted : require
+#include "post.h"
+#include "lib/depth.glsl"
+#include "lib/safe.glsl"
+
+layout(local_size_x = kGroupSide, local_size_y = kGroupSide) in;
+layout(push_constant, scalar) uniform Push { Views push; };
+layout(set = 0, binding = kAlbedoImage) uniform texture2D albedo;
+layout(set = 0, binding = kNormalImage) uniform texture2D normal;
+layout(set = 0, binding = kDepthImage) uniform texture2D depth;
+layout(set = 0, binding = kTarget) writeonly uniform image2D target;
+
+const vec3 kCascadeColours[4] =
+    vec3[](kCascadeColour0, kCascadeColour1, kCascadeColour2, kCascadeColour3);
+
+vec3 cascades(float distance, vec3 scene) {
+  uint cascade = 0;
+  float begin = push.near;
+  for (; cascade < 3 && distance > push.splits[cascade]; ++cascade) begin = push.splits[cascade];
+  const float end = push.splits[cascade];
+  const bool blends = cascade < 3 && distance > end - kCascadeBlend * (end - begin);
+  const vec3 shown = kCascadeTint * kCascadeColours[cascade] + kCascadeDim * scene;
+  return blends ? kBlendBrighter * shown : shown;
+}
+
+vec3 view(ivec2 pixel) {
+  const float standard = texelFetch(depth, pixel, 0).r;
+  const float d = clamp(isFinite(standard) ? 1.0 - standard : 0.0, 0.0, 1.0);
+  if (d == 0.0) return vec3(0.0);  // sky
+  const vec3 scene = clamp(finiteOrZero(texelFetch(albedo, pixel, 0).rgb), 0.0, 1.0);
+  switch (push.mode) {
+    case kNormal:
+      return finiteOrZero(texelFetch(normal, pixel, 0).rgb);
+    case kDepth:
+      return vec3(linearDepth(d, push.near, push.far) / push.far);
+    case kCascades:
+      return cascades(linearDepth(d, push.near, push.far), scene);
+    default:
+      return scene;
+  }
+}
+
+void main() {
+  const uvec2 at = gl_GlobalInvocationID.xy;
+  if (any(greaterThanEqual(at, push.size))) return;
+  imageStore(target, ivec2(at), vec4(clamp(view(ivec2(at)), 0.0, 1.0), 1.0));
+}
