@@ -278,18 +278,16 @@ class Judge {
                             forPlain[s].hi, byPlain});
       result.plainBudget = std::max(result.plainBudget, byPlain);
     }
-    // Where the twin is outside, both are asked of the widened bound.
-    if (!outSpec && plainHere) {
-      plainNearby = std::max(plainNearby, plainHere->budget);
-      keepWorse(worstPlain, *plainHere);
-    }
+    if (plainHere) keepWorse(worstPlain, *plainHere);
+    const bool plainFar = plainHere && plainHere->budget > policy["plainBudget"];
     for (std::size_t f = 0; f < fieldOut.size(); ++f)
       result.fields[f].outside += fieldOut[f] ? 1 : 0;
     result.outside += outSpec;
     result.outsideDevice += outDevice;
     result.reassociated += moved;
     result.ambiguous += ambiguous;
-    if (outSpec) offenders.push_back(i);
+    // Of another arrangement the widened bound is asked for both, wherever either is not inside.
+    if (outSpec || plainFar) offenders.push_back(i);
   }
 
   void noteUnspecified(std::size_t i, std::size_t s, const Bounded& b) {
@@ -341,18 +339,18 @@ class Judge {
       result.widening = result.truncated ? 0 : smallestWidening();
       result.verdict = result.widening > 0 ? Class::kEquivalent : Class::kWrong;
     }
-    if (result.verdict != Class::kWrong) requirePlainNearby();
+    if (result.outside == 0) requirePlainNearby();
     requireNarrowBounds();
     if (!result.problems.empty()) result.verdict = Class::kWrong;
   }
 
   void requirePlainNearby() {
-    if (plainNearby > policy["plainBudget"]) {
+    if (result.plainBudget > policy["plainBudget"]) {
       result.worst = worstPlain;
       result.problems.push_back(fmt::format(
           "the strict twin is inside, but the module as it is uses {:.3g} budgets where "
           "at most {:.0f} can be rearrangement",
-          plainNearby, policy["plainBudget"]));
+          result.plainBudget, policy["plainBudget"]));
     }
   }
 
@@ -391,10 +389,6 @@ class Judge {
     std::vector<Bounded> allowed(scalars.size());
     evaluate(rules(), i, allowed);
     ambiguous += std::ranges::any_of(allowed, &Bounded::ambiguous);
-    // Widened out of an operation's domain, anything would be inside.
-    if (std::ranges::any_of(allowed,
-                            [](const Bounded& b) { return b.unspecified() || b.notJudged(); }))
-      return false;
     store(allowed);
     for (std::size_t s = 0; s < scalars.size(); ++s) {
       const double got = twin(i, scalars[s]);
@@ -417,7 +411,6 @@ class Judge {
   std::vector<Widths> widths;
   std::vector<std::size_t> offenders;
   std::optional<Offender> worstPlain;
-  double plainNearby = 0;  // worst of the module as it is, where its twin is inside
   bool unspecifiedSeen = false;
   std::mutex mutex;
   Verdict result;
