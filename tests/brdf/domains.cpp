@@ -96,29 +96,12 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 
 std::vector<Sample> degenerate() {
   using Limits = std::numeric_limits<float>;
-  const std::array special = {0.0f,
-                              -0.0f,
-                              1.0f,
-                              -1.0f,
-                              0.5f,
-                              2.0f,
-                              -2.0f,
-                              Limits::min(),
-                              -Limits::min(),
-                              Limits::denorm_min(),
-                              Limits::max(),
-                              Limits::lowest(),
-                              Limits::infinity(),
-                              -Limits::infinity(),
-                              Limits::quiet_NaN(),
-                              -Limits::quiet_NaN(),
-                              kMinRoughness,
-                              kShortestHalf,
-                              kMinNoV,
-                              1e-10f,
-                              1e10f,
-                              1e-30f,
-                              1e30f};
+  const std::array special = {0.0f, -0.0f, 1.0f, -1.0f, 0.5f, 2.0f, -2.0f, Limits::min(),
+                              -Limits::min(), Limits::denorm_min(), Limits::max(), Limits::lowest(),
+                              Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(),
+                              -Limits::quiet_NaN(), kMinRoughness, kShortestHalf, kMinNoV,
+                              // Whose squares underflow or overflow, and, nearer, do not.
+                              1e-10f, 1e10f, 1e-30f, 1e30f};
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
                         .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),
