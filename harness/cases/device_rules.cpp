@@ -3,25 +3,18 @@
 #include <unistd.h>
 
 #include <cctype>
-#include <cstdlib>
 #include <fstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "harness/cases/cache.h"
 #include "harness/error.h"
 
 namespace gnomon {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path cacheFolder() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
-    return fs::path(cache) / "gnomon/devices";
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".cache/gnomon/devices";
-  return {};
-}
 
 MeasuredError parseOne(const nlohmann::json& entry, const std::string& where) {
   for (const char* key : {"ulp", "absolute"})
@@ -69,7 +62,7 @@ std::string deviceKey(const GpuInfo& gpu) {
 }
 
 std::optional<DeviceErrors> loadDeviceErrors(const GpuInfo& gpu, const fs::path& root) {
-  for (const fs::path& folder : {cacheFolder(), root / "data/devices"}) {
+  for (const fs::path& folder : {cacheFolder() / "devices", root / "data/devices"}) {
     const fs::path file = folder / (deviceKey(gpu) + ".json");
     if (fs::exists(file)) return parse(file);
   }
@@ -77,7 +70,7 @@ std::optional<DeviceErrors> loadDeviceErrors(const GpuInfo& gpu, const fs::path&
 }
 
 void cacheDeviceErrors(const GpuInfo& gpu, const DeviceErrors& errors) {
-  const fs::path folder = cacheFolder(), file = folder / (deviceKey(gpu) + ".json");
+  const fs::path folder = cacheFolder() / "devices", file = folder / (deviceKey(gpu) + ".json");
   std::error_code error;
   fs::create_directories(folder, error);
   // Renamed into place, so that a run beside this one never reads half a file.

@@ -72,7 +72,7 @@ Observation KernelCase::run(Stimulus stimulus) {
   if (!applies(stimulus.push)) return {.applies = false};
   ++runs;
   stimulus.limit = session.limit();
-  return observe(session.subject(kernelName), stimulus);
+  return observe(session.subject(kernelName), stimulus, session.watch());
 }
 
 void KernelCase::expectClean(const Observation& seen) {
@@ -97,7 +97,7 @@ void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
   record(bounds, seen, expected, layout);
   if (expected.width == 0) return;
   const ImageSpec& image = contract.image(expected.output);
-  if (!isNarrow(image.format)) return;
+  if (!isNarrow(image.format) || !seen.twin.contains(narrowName(image))) return;
   Expectation narrow = expected;
   narrow.output = narrowName(image);
   narrow.storage = storageOf(image.format);

@@ -79,7 +79,16 @@ std::vector<CaseName> allCases() {
 class Listener : public testing::EmptyTestEventListener {
  public:
   Listener(Session& s, const std::vector<CaseName>& cases, const Observer& o)
-      : session(s), chosen(cases), observer(o) {}
+      : session(s), chosen(cases), observer(o) {
+    listeners().Append(this);
+  }
+  ~Listener() override { listeners().Release(this); }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  static testing::TestEventListeners& listeners() {
+    return testing::UnitTest::GetInstance()->listeners();
+  }
 
  private:
   void OnTestStart(const testing::TestInfo& info) override {
@@ -97,6 +106,8 @@ class Listener : public testing::EmptyTestEventListener {
       record.messages.emplace_back(
           message.starts_with("Failed\n") ? message.substr(message.find('\n') + 1) : message);
     if (part.skipped() && !record.unsupported) record.skipped = part.message();
+    // GoogleTest's way for a listener, the last one, to leave a test.
+    if (part.failed() && observer.endsCaseAtFailure) throw testing::AssertionException(part);
   }
 
   void OnTestEnd(const testing::TestInfo& info) override {
@@ -130,10 +141,14 @@ std::vector<CaseName> selectCases(const Selection& selection) {
   return chosen;
 }
 
+bool judgesModel(const CaseName& c) {
+  return std::string_view(c.name).substr(0, c.name.find('.')).ends_with("Model");
+}
+
 void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer) {
-  testing::TestEventListeners& listeners = testing::UnitTest::GetInstance()->listeners();
-  delete listeners.Release(listeners.default_result_printer());
-  listeners.Append(new Listener(session, cases, observer));
+  delete Listener::listeners().Release(Listener::listeners().default_result_printer());
+  const Listener listener(session, cases, observer);
+  const std::size_t before = session.cases().size();
   // GoogleTest runs suites as the linker ordered them; ours build on each other, so kernel by
   // kernel.
   for (std::size_t begin = 0, end = 0; begin < cases.size(); begin = end) {
@@ -144,8 +159,9 @@ void runCases(Session& session, const std::vector<CaseName>& cases, const Observ
     // The records say more than GoogleTest's own status.
     [[maybe_unused]] const int status = RUN_ALL_TESTS();
   }
-  if (session.cases().size() != cases.size())
-    throw std::logic_error(fmt::format("{} of {} cases ran", session.cases().size(), cases.size()));
+  if (session.cases().size() - before != cases.size())
+    throw std::logic_error(
+        fmt::format("{} of {} cases ran", session.cases().size() - before, cases.size()));
 }
 
 }  // namespace gnomon

@@ -29,9 +29,13 @@ std::vector<CaseName> selectCases(const Selection& selection);
 struct Observer {
   std::function<void(const CaseName&, std::size_t index, std::size_t count)> begin;
   std::function<void(const CaseRecord&)> end;
+  bool endsCaseAtFailure = false;  ///< the first failure of a case is all that is asked of it
 };
 
-/// Runs the cases in this process; the session holds the records afterwards.
+/// Whether a case judges a model against truth, and runs no kernel: its suite is called ...Model.
+bool judgesModel(const CaseName& c);
+
+/// Runs the cases in this process, kernel by kernel; the session holds the records afterwards.
 void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer);
 
 }  // namespace gnomon

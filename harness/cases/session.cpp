@@ -20,6 +20,14 @@ std::chrono::milliseconds caseLimit(const SessionOptions& options, const Policy&
   return std::chrono::milliseconds(static_cast<long>(1000 * policy["caseSeconds"]));
 }
 
+KernelModule moduleOf(const SessionOptions& options, const KernelRecord& record) {
+  const auto foreign = options.kernels.find(record.name());
+  if (foreign != options.kernels.end())
+    return loadKernel(foreign->second, record, options.root / "kernels");
+  const auto words = embeddedSpirv(record.file);
+  return {.words = SpirvWords(words.begin(), words.end()), .origin = "kernels/" + record.file};
+}
+
 Session::Session(SessionOptions options)
     : settings(std::move(options)), choices(Policy::load(settings.root / "tests/policy.json")) {
   theSession = this;
@@ -52,11 +60,15 @@ const Subject& Session::subject(const std::string& kernel) {
 }
 
 KernelModule Session::load(const KernelRecord& record) const {
-  const auto foreign = settings.kernels.find(record.name());
-  if (foreign != settings.kernels.end())
-    return loadKernel(foreign->second, record, settings.root / "kernels");
-  const auto words = embeddedSpirv(record.file);
-  return {.words = SpirvWords(words.begin(), words.end()), .origin = "kernels/" + record.file};
+  KernelModule module = moduleOf(settings, record);
+  const auto mutant = mutated.find(record.name());
+  if (mutant != mutated.end()) module.words = mutant->second;
+  return module;
+}
+
+void Session::mutate(const std::string& kernel, SpirvWords module) {
+  mutated[kernel] = std::move(module);
+  subjects.erase(kernel);
 }
 
 std::uint64_t Session::foreignHash(const std::string& kernel) const {

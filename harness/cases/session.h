@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "harness/cases/device_rules.h"
+#include "harness/hygiene/observe.h"
 #include "harness/hygiene/subject.h"
 #include "harness/verdict/policy.h"
 #include "harness/verdict/verdict.h"
@@ -30,6 +31,9 @@ struct SessionOptions {
 
 /// The longest time that a case may take.
 std::chrono::milliseconds caseLimit(const SessionOptions& options, const Policy& policy);
+
+/// The module of a kernel, ours or the one that replaces it. Throws UsageError.
+KernelModule moduleOf(const SessionOptions& options, const KernelRecord& record);
 
 /// What one case has found.
 struct CaseRecord {
@@ -65,6 +69,13 @@ class Session {
   /// Unsupported, UsageError, DeviceError.
   const Subject& subject(const std::string& kernel);
 
+  /// From now on the kernel is this module, under its own interface: a mutant of it.
+  void mutate(const std::string& kernel, SpirvWords module);
+
+  /// How much of every run is watched from now on.
+  void watchOnly(Watch watch) { watched = watch; }
+  Watch watch() const { return watched; }
+
   /// Changes with what a kernel of the user's comes to, by its file or what that includes.
   std::uint64_t foreignHash(const std::string& kernel) const;
 
@@ -92,6 +103,7 @@ class Session {
   std::chrono::milliseconds limit() const;
 
   void beginCase(std::string name, std::string kernel);
+  void forgetCases() { records.clear(); }
   CaseRecord& currentCase();
   const std::vector<CaseRecord>& cases() const { return records; }
 
@@ -104,6 +116,8 @@ class Session {
   std::optional<Bounds> rules;
   std::optional<DeviceErrors> errors;
   std::map<std::string, std::unique_ptr<Subject>> subjects;
+  std::map<std::string, SpirvWords> mutated;
+  Watch watched = Watch::kAll;
   std::vector<CaseRecord> records;
 };
 

@@ -28,7 +28,8 @@ struct DevicesOptions {
 int devices(const DevicesOptions& options);
 
 struct ListOptions {
-  std::string what;  ///< stages, kernels or cases
+  std::string what;    ///< stages, kernels or cases
+  bool kills = false;  ///< of cases: which mutants each kills
   std::vector<std::string> stages;
   std::string json;
 };
@@ -44,6 +45,17 @@ struct ValidateOptions {
   std::optional<unsigned> jobs{};  ///< workers at a time
 };
 int validate(const ValidateOptions& options);
+
+struct MutateOptions {
+  SessionOptions session;
+  std::vector<std::string> stages;
+  std::vector<std::string> operators;
+  std::optional<std::size_t> sample{};  ///< mutants of each kernel
+  std::optional<unsigned> jobs{};
+  bool bless = false;  ///< write the scores into tests/mutants/ and README.md
+  std::string json;
+};
+int mutate(const MutateOptions& options);
 
 struct BenchOptions {
   SessionOptions session;

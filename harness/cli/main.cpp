@@ -9,6 +9,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/error.h"
+#include "harness/mutate/operators.h"
 
 namespace {
 
@@ -73,6 +74,13 @@ void addShard(CLI::App& command, Selection& selection) {
       ->type_name("I/N");
 }
 
+std::string operatorsHelp() {
+  std::string text = "Only these operators, with commas between:";
+  for (const OperatorInfo& o : mutationOperators()) text += fmt::format(" {} ({});", o.name, o.summary);
+  text.back() = '.';
+  return text;
+}
+
 /// What the parsed command line will do.
 using Action = std::function<int()>;
 
@@ -121,6 +129,30 @@ void addValidate(CLI::App& app, Action& action) {
   addSessionOptions(*command, o->session, o->json);
   command->footer(kExit);
   command->callback([&action, o] { action = [o] { return validate(*o); }; });
+}
+
+void addMutate(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "mutate", "Change kernels one instruction at a time: do the cases notice?");
+  auto o = std::make_shared<MutateOptions>();
+  command->add_option("stages", o->stages, "STAGE or STAGE/ENTRY (default: all)");
+  command
+      ->add_option_function<std::size_t>(
+          "--sample", [o](std::size_t n) { o->sample = n; },
+          "Only N mutants of each kernel, chosen by --seed")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
+  command->add_option("--operators", o->operators, operatorsHelp())
+      ->delimiter(',')
+      ->type_name("LIST");
+  command->add_option("--jobs", o->jobs, kJobs)->check(CLI::PositiveNumber)->type_name("N");
+  command->add_flag("--bless", o->bless,
+                    "Write the scores into tests/mutants/ and README.md's table of stages");
+  addSessionOptions(*command, o->session, o->json);
+  command->footer(
+      "Exit status: 0 all good; 1 a survivor is not explained, a score is below the policy or not "
+      "the one on record; 2 usage or bad input file; 3 no usable device.");
+  command->callback([&action, o] { action = [o] { return mutate(*o); }; });
 }
 
 void addBench(CLI::App& app, Action& action) {
@@ -187,6 +219,7 @@ int run(int argc, char** argv) {
   addDevices(app, action);
   addList(app, action);
   addValidate(app, action);
+  addMutate(app, action);
   addBench(app, action);
   addCompare(app, action);
   addTest(app, action);

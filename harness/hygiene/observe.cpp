@@ -129,17 +129,19 @@ bool writesNarrow(const Subject& subject, const Stimulus& stimulus) {
 
 }  // namespace
 
-Observation observe(const Subject& subject, const Stimulus& stimulus) {
+Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watch) {
+  const bool all = watch == Watch::kAll;
   Observation seen;
   seen.unmapped = {subject.interface().unmapped.begin(), subject.interface().unmapped.end()};
   {
     Resources resources(subject, stimulus, Target::kFloat);
     Observer observer(subject, resources, seen);
-    observer.watch(subject.plain(), "kernel", seen.plain);
+    if (all) observer.watch(subject.plain(), "kernel", seen.plain);
     observer.watch(subject.twin(), "strict twin", seen.twin);
-    observer.compareArrangements();
+    if (all) observer.compareArrangements();
   }
-  if (writesNarrow(subject, stimulus)) {
+  if (!all) seen.plain = seen.twin;
+  if (all && writesNarrow(subject, stimulus)) {
     Resources resources(subject, stimulus, Target::kContract);
     Observer observer(subject, resources, seen);
     observer.watch(subject.plain(), "kernel", seen.plain);

@@ -21,6 +21,12 @@ struct Observation {
   std::vector<std::string> findings{};   ///< hygiene: one sentence each; empty if clean
 };
 
+/// How much is watched.
+enum class Watch {
+  kAll,
+  kTwinAlone  ///< a part of it: the strict twin into float images; `plain` repeats what it gave
+};
+
 /// Outputs and guard bands are poisoned before every run, with one pattern in the first and another
 /// in the second run of each module, so a word that keeps its poison twice was never written, and
 /// any other difference depends on memory the kernel does not own or on the order of its threads.
@@ -33,7 +39,7 @@ struct Observation {
 /// Findings: words not written, writes outside, writes into inputs, runs that differ though the
 /// contract says deterministic, an order twin that differs, validation messages. Throws GpuError
 /// when the device is lost or the limit passes.
-Observation observe(const Subject& subject, const Stimulus& stimulus);
+Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watch = Watch::kAll);
 
 /// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so
 /// many that checking each would take hours. What is measured so has to be observed on a part

@@ -134,6 +134,9 @@ std::string toJson(const WorkerTask& task) {
                {"kernels", kernels},
                {"validation", s.validation},
                {"cases", task.cases},
+               {"mutated", task.mutated},
+               {"mutants", task.mutants},
+               {"kills", task.kills},
                {"errors", task.errors ? errorsJson(*task.errors) : Json(nullptr)}});
 }
 
@@ -144,7 +147,10 @@ WorkerTask workerTask(std::string_view json) try {
                               .seed = j.at("seed"),
                               .cases = optional<std::size_t>(j.at("generated")),
                               .validation = j.at("validation")},
-                  .cases = j.at("cases")};
+                  .cases = j.at("cases"),
+                  .mutated = j.at("mutated"),
+                  .mutants = j.at("mutants"),
+                  .kills = j.at("kills")};
   if (const auto seconds = optional<long>(j.at("timeout")))
     task.session.timeout = std::chrono::seconds(*seconds);
   if (!j.at("errors").is_null()) task.errors = deviceErrors(j.at("errors"));

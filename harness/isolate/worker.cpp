@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <new>
+#include <utility>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -15,6 +16,7 @@
 #include "harness/cases/runner.h"
 #include "harness/error.h"
 #include "harness/isolate/fault.h"
+#include "harness/mutate/mutants.h"
 
 namespace gnomon {
 namespace {
@@ -27,6 +29,8 @@ constexpr std::string_view kPrepared = "@prepared ";
 constexpr std::string_view kBegun = "@begun ";
 constexpr std::string_view kFurther = "@further ";
 constexpr std::string_view kEnded = "@ended ";
+constexpr std::string_view kMutant = "@mutant ";
+constexpr std::string_view kTold = "@told ";
 
 constexpr int kUsageStatus = 2, kDeviceStatus = 3;  // of the command
 
@@ -54,11 +58,13 @@ void dieWithoutMemory() {
 }
 
 std::vector<CaseName> namedCases(const std::vector<std::string>& names) {
+  const std::vector<CaseName> all = selectCases({});
   std::vector<CaseName> chosen;
-  for (const CaseName& c : selectCases({}))
-    if (std::ranges::find(names, c.name) != names.end()) chosen.push_back(c);
-  if (chosen.size() != names.size())
-    throw UsageError("a worker was asked for cases that do not exist");
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(all, name, &CaseName::name);
+    if (found == all.end()) throw UsageError("a worker was asked for cases that do not exist");
+    chosen.push_back(*found);
+  }
   return chosen;
 }
 
@@ -96,6 +102,37 @@ void end(const Session& session, const CaseRecord& record) {
   if (session.deviceLost() || losesDevice(record.name)) _exit(0);
 }
 
+/// One case after another, in this order, until so many have failed. How much is watched to begin
+/// with is what most mutants fail by, at a quarter of the time that compiling all of it takes; what
+/// passes is watched whole.
+void runToFailures(Session& session, const std::vector<CaseName>& cases, unsigned failures,
+                   const Observer& observer) {
+  std::vector<CaseName> left;
+  for (const Watch watch : {Watch::kTwinAlone, Watch::kAll}) {
+    session.watchOnly(watch);
+    for (const CaseName& c : watch == Watch::kAll ? std::exchange(left, {}) : cases) {
+      runCases(session, {c}, observer);
+      if (!session.currentCase().failed)
+        left.push_back(c);
+      else if (--failures == 0)
+        return;
+    }
+  }
+}
+
+void judgeMutants(Session& session, const WorkerTask& task, const std::vector<CaseName>& cases,
+                  Observer observer) {
+  observer.endsCaseAtFailure = true;
+  const KernelModule module = moduleOf(task.session, findKernel(task.mutated));
+  for (Mutant& m : mutantsNamed(module.words, task.mutants)) {
+    say(kMutant, m.id);
+    session.mutate(task.mutated, std::move(m.module));
+    runToFailures(session, cases, task.kills, observer);
+    session.forgetCases();
+    say(kTold, m.id);
+  }
+}
+
 }  // namespace
 
 void serve(const WorkerTask& task) {
@@ -105,9 +142,11 @@ void serve(const WorkerTask& task) {
   if (task.errors) session.know(*task.errors);
   if (cases.empty()) return prepareHere(session);
   session.onProgress = [] { say(kFurther, ""); };
-  runCases(session, cases,
-           {.begin = [](const CaseName& c, std::size_t, std::size_t) { begin(c.name); },
-            .end = [&](const CaseRecord& r) { end(session, r); }});
+  const Observer observer{
+      .begin = [](const CaseName& c, std::size_t, std::size_t) { begin(c.name); },
+      .end = [&](const CaseRecord& r) { end(session, r); }};
+  if (task.mutants.empty()) return runCases(session, cases, observer);
+  judgeMutants(session, task, cases, observer);
 }
 
 // ---- in the parent --------------------------------------------------------------------------
@@ -125,6 +164,8 @@ class Listener {
     if (take(line, kBegun)) beginCase(std::string(line));
     if (take(line, kFurther)) startAgain();
     if (take(line, kEnded)) endCase(caseRecord(line));
+    if (take(line, kMutant)) beginMutant(std::string(line));
+    if (take(line, kTold)) endMutant();
   } catch (const UsageError&) {  // it lost its mind: what it does not say well, it has not said
   }
 
@@ -151,6 +192,18 @@ class Listener {
     report.running.clear();
     ++report.ended;
     if (options.ended) options.ended(std::move(record));
+  }
+
+  void beginMutant(std::string id) {
+    startAgain();
+    report.mutant = std::move(id);
+    if (options.mutant) options.mutant(report.mutant);
+  }
+
+  void endMutant() {
+    startAgain();
+    if (options.told) options.told(report.mutant);
+    report.mutant.clear();
   }
 
   const WorkerOptions& options;

@@ -16,7 +16,8 @@ namespace gnomon {
 
 /// In the worker: runs the task's cases and prints a line as each begins and ends; without cases,
 /// opens the device, loads the foreign kernels and says what it found. After a case that has lost
-/// the device it ends early, since another one may not be had in this process.
+/// the device it ends early, since another one may not be had in this process. With mutants, the
+/// cases run on each of them, in the task's order, to the first that fails.
 void serve(const WorkerTask& task);
 
 /// What a case may take longer, as its parent sees it, than what it may wait for the device: time
@@ -29,12 +30,15 @@ struct WorkerOptions {
   std::uint64_t memoryBytes = 0;            ///< as ProcessOptions::memoryBytes
   std::function<void(const std::string& name)> begun{};  ///< told of every case as it begins
   std::function<void(CaseRecord)> ended{};               ///< ... and as it ends
+  std::function<void(const std::string& id)> mutant{};   ///< told of every mutant as it begins
+  std::function<void(const std::string& id)> told{};     ///< ... and when no case is left for it
 };
 
 /// What became of a task.
 struct WorkerReport {
   std::size_t ended = 0;                     ///< cases that have
   std::string running{};                     ///< the case that had begun but not ended; or none
+  std::string mutant{};                      ///< the same of a mutant
   std::optional<Preparation> preparation{};  ///< of a task without cases
   ProcessResult process{};
 

@@ -143,6 +143,7 @@ struct KernelRecord {
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
   bool deterministic = true;  ///< two runs on the same input agree to the bit
+  bool mutates = true;        ///< false: generated, so that `gnomon mutate` leaves it out
   /// What a foreign kernel may express otherwise: convention -> values, ours first.
   std::map<std::string, std::vector<std::string>> conventions{};
   FunctionEntry functions{};

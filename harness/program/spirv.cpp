@@ -370,6 +370,13 @@ SpirvWords legalized(std::span<const std::uint32_t> module) {
   return optimized(module, [](spvtools::Optimizer& o) { o.RegisterLegalizationPasses(); });
 }
 
+SpirvWords optimizedForSpeed(std::span<const std::uint32_t> module) {
+  return optimized(module, [](spvtools::Optimizer& o) {
+    o.RegisterPass(spvtools::CreateStripDebugInfoPass());
+    o.RegisterPerformancePasses();
+  });
+}
+
 SpirvWords withoutImageFormats(std::span<const std::uint32_t> module) {
   constexpr std::size_t kSampled = 7, kFormat = 8;
   constexpr std::uint32_t kStorage = 2;

@@ -70,6 +70,10 @@ SpirvWords strictTwin(std::span<const std::uint32_t> module, const StrictOptions
 /// UsageError where they refuse.
 SpirvWords legalized(std::span<const std::uint32_t> module);
 
+/// What SPIRV-Tools' performance passes make of a valid module, without debug information. Throws
+/// UsageError where they refuse.
+SpirvWords optimizedForSpeed(std::span<const std::uint32_t> module);
+
 /// The same module with storage images of no format, so that they can be bound to images of any: a
 /// writer's arithmetic is judged in 32-bit floats before a narrow format rounds it.
 SpirvWords withoutImageFormats(std::span<const std::uint32_t> module);

@@ -5,10 +5,10 @@
 
 namespace gnomon {
 
-void parallelFor(std::size_t n, const std::function<void(std::size_t, std::size_t)>& work) {
-  constexpr std::size_t kGrain = 1024;
+void parallelFor(std::size_t n, const std::function<void(std::size_t, std::size_t)>& work,
+                 std::size_t grain) {
   tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, n, kGrain),
+      tbb::blocked_range<std::size_t>(0, n, grain),
       [&](const tbb::blocked_range<std::size_t>& range) { work(range.begin(), range.end()); });
 }
 

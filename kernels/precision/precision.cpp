@@ -24,6 +24,7 @@ KernelRecord entry(const char* name, uint operation) {
       .features = {"scalarBlockLayout"},
       .specialization = {{kOperationId, operation}},
       .deterministic = true,
+      .mutates = false,
       .summary = fmt::format("the built-in {} over its domain, and its worst error here", name),
   };
 }
@@ -41,6 +42,7 @@ KernelRecord copies(const char* name, const char* file, const BufferSpec& buffer
           .images = {image},
           .push = describe<Pixels>("Pixels", field("size", &Pixels::size)),
           .features = {"scalarBlockLayout"},
+          .mutates = false,
           .summary = summary};
 }
 

@@ -1,0 +1,284 @@
+#include <chrono>
+#include <fstream>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "harness/cli/commands.h"
+#include "harness/error.h"
+#include "harness/isolate/worker.h"
+#include "harness/mutate/explained.h"
+#include "harness/mutate/inquiry.h"
+#include "harness/report/summary.h"
+#include "harness/report/terminal.h"
+
+namespace gnomon {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// A mutant that no case tells from the kernel.
+struct Survivor {
+  const Mutant* mutant = nullptr;
+  const Explanation* explanation = nullptr;  ///< or none
+};
+
+/// What a run says of one kernel, against what is on record.
+struct Outcome {
+  Answer answer{};
+  Score score{};
+  std::vector<Survivor> survivors{};
+  std::vector<std::string> problems{};  ///< each makes the command fail
+};
+
+std::string stageOf(const std::string& kernel) { return kernel.substr(0, kernel.find('/')); }
+
+fs::path recordFile(const fs::path& root, const std::string& kernel) {
+  return root / "tests/mutants" / (stageOf(kernel) + ".json");
+}
+
+Score scoreOf(const Answer& answer) {
+  return {.mutants = answer.mutants.size() + answer.equivalent.size(),
+          .equivalent = answer.equivalent.size(),
+          .killed = answer.killed()};
+}
+
+std::string scoreText(const Score& s) {
+  return fmt::format("{:.3f} ({} of {})", s.value(), s.killed, s.mutants - s.equivalent);
+}
+
+/// An explanation holds for the line and the change that it was written for.
+const Explanation* explanationOf(const MutantRecord& record, const Mutant& m) {
+  const Explanation* e = record.find(m.id);
+  return e != nullptr && e->text == m.place.text && e->change == m.change ? e : nullptr;
+}
+
+Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& policy, bool whole) {
+  Outcome outcome{.answer = std::move(answer)};
+  const Answer& a = outcome.answer;
+  outcome.score = scoreOf(a);
+  std::size_t unexplained = 0;
+  for (std::size_t i = 0; i < a.mutants.size(); ++i) {
+    if (!a.fates[i].survived()) continue;
+    outcome.survivors.push_back({&a.mutants[i], explanationOf(record, a.mutants[i])});
+    unexplained += outcome.survivors.back().explanation == nullptr;
+  }
+  if (unexplained > 0)
+    outcome.problems.push_back(fmt::format(
+        "{}: {} of its mutants survive and nobody has explained why", a.kernel, unexplained));
+  if (!whole) return outcome;
+  if (outcome.score.value() < policy["mutationScore"])
+    outcome.problems.push_back(fmt::format("{}: its score is {:.3f}, below the policy's {:g}",
+                                           a.kernel, outcome.score.value(),
+                                           policy["mutationScore"]));
+  for (const Explanation& e : record.survivors) {
+    const bool needed = std::ranges::any_of(outcome.survivors, [&](const Survivor& s) {
+      return s.explanation == &e;
+    });
+    if (!needed)
+      outcome.problems.push_back(fmt::format(
+          "{}: tests/mutants/{}.json explains {}, which does not survive, or is another now",
+          a.kernel, stageOf(a.kernel), e.id));
+  }
+  return outcome;
+}
+
+std::string describe(const Survivor& s) {
+  const Mutant& m = *s.mutant;
+  return fmt::format("  kernels/{}:{}  {}\n    {}\n    {}\n    {}\n", m.place.file, m.place.line,
+                     m.id, m.place.text, m.change,
+                     s.explanation ? "explained: " + s.explanation->reason : "NOT EXPLAINED");
+}
+
+void printSurvivors(Terminal& terminal, const Outcome& outcome) {
+  if (outcome.survivors.empty()) return;
+  std::string text = fmt::format("survivors of {}\n", outcome.answer.kernel);
+  for (const Survivor& s : outcome.survivors) text += describe(s);
+  terminal.print(text);
+}
+
+std::string outcomeTable(const std::vector<Outcome>& outcomes, const Terminal& terminal) {
+  std::vector<std::vector<std::string>> rows = {
+      {"mutants of", "mutants", "equivalent", "killed", "survived", "explained", "score", "time"}};
+  for (const Outcome& o : outcomes) {
+    const std::size_t explained = static_cast<std::size_t>(std::ranges::count_if(
+        o.survivors, [](const Survivor& s) { return s.explanation != nullptr; }));
+    rows.push_back({o.answer.kernel, grouped(o.score.mutants), grouped(o.score.equivalent),
+                    grouped(o.score.killed), grouped(o.survivors.size()), grouped(explained),
+                    terminal.paint(o.problems.empty() ? Colour::kGreen : Colour::kRed,
+                                   fmt::format("{:.3f}", o.score.value())),
+                    fmt::format("{:.1f} s", o.answer.seconds)});
+  }
+  return table(rows, " rrrrrrr");
+}
+
+nlohmann::json jsonOf(const Mutant& m) {
+  return {{"id", m.id},           {"operator", m.operatorName}, {"file", m.place.file},
+          {"line", m.place.line}, {"text", m.place.text},       {"change", m.change}};
+}
+
+std::string outcomesJson(const std::vector<Outcome>& outcomes, const MutateOptions& options,
+                         const GpuInfo& gpu) {
+  auto stages = nlohmann::json::array();
+  bool failed = false;
+  for (const Outcome& o : outcomes) {
+    auto survived = nlohmann::json::array(), killed = nlohmann::json::array();
+    for (const Survivor& s : o.survivors) {
+      survived.push_back(jsonOf(*s.mutant));
+      survived.back()["reason"] =
+          s.explanation ? nlohmann::json(s.explanation->reason) : nlohmann::json(nullptr);
+    }
+    for (std::size_t i = 0; i < o.answer.mutants.size(); ++i) {
+      const Fate& fate = o.answer.fates[i];
+      if (fate.survived()) continue;
+      killed.push_back(jsonOf(o.answer.mutants[i]));
+      killed.back()["by"] = fate.kills.front().by;
+      killed.back()["how"] = fate.kills.front().how;
+    }
+    stages.push_back({{"stage", stageOf(o.answer.kernel)},
+                      {"kernel", o.answer.kernel},
+                      {"mutants", o.score.mutants},
+                      {"equivalent", o.score.equivalent},
+                      {"invalid", o.answer.invalid},
+                      {"duplicates", o.answer.duplicates},
+                      {"killed", o.score.killed},
+                      {"kills", killed},
+                      {"survived", survived},
+                      {"score", o.score.value()},
+                      {"seconds", o.answer.seconds},
+                      {"problems", o.problems}});
+    failed |= !o.problems.empty();
+  }
+  return nlohmann::json{{"schema", 1},
+                        {"device", {{"name", gpu.name}, {"driver", gpu.driver}, {"api", gpu.api}}},
+                        {"seed", options.session.seed},
+                        {"sample", options.sample ? nlohmann::json(*options.sample) : nullptr},
+                        {"stages", stages},
+                        {"failed", failed}}
+             .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
+         "\n";
+}
+
+/// What the progress line says, and how long it may take.
+class Progress {
+ public:
+  explicit Progress(Terminal& t) : terminal(t) {}
+
+  InquiryObserver of(const std::string& kernel) {
+    begin = Clock::now();
+    first.reset();
+    return {[this, kernel](std::size_t known, std::size_t all, std::size_t killed,
+                           const std::string& now) {
+      if (!first && known > 0) first = known;  // that cost nothing
+      terminal.progress(fmt::format("{} [{}/{}] {} killed{}: {}", kernel, known, all, killed,
+                                    left(known, all), now));
+    }};
+  }
+
+ private:
+  std::string left(std::size_t known, std::size_t all) const {
+    const std::size_t done = known - first.value_or(0);
+    if (done < 8) return "";  // too few to tell
+    const double spent = std::chrono::duration<double>(Clock::now() - begin).count();
+    const double seconds = spent / static_cast<double>(done) * static_cast<double>(all - known);
+    return seconds < 60 ? fmt::format(", about {:.0f} s left", seconds)
+                        : fmt::format(", about {:.0f} min left", seconds / 60);
+  }
+
+  Terminal& terminal;
+  Clock::time_point begin{};
+  std::optional<std::size_t> first{};
+};
+
+std::string contentOf(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// The scores of this run on record, in tests/mutants/ and in the README's table of stages.
+void bless(const std::vector<Outcome>& outcomes, const fs::path& root) {
+  std::map<std::string, std::string> cells;
+  for (const Outcome& o : outcomes) {
+    const fs::path file = recordFile(root, o.answer.kernel);
+    MutantRecords records = loadMutantRecords(file);
+    records[o.answer.kernel].score = o.score;
+    saveMutantRecords(file, records);
+    cells[o.answer.kernel] = scoreText(o.score);
+  }
+  const fs::path readme = root / "README.md";
+  writeText(readme, withScores(contentOf(readme), cells));
+}
+
+/// What is on record has to be true, as far as this run can tell.
+void compareWithRecord(Outcome& outcome, const MutantRecord& record, const fs::path& root,
+                       bool sampled) {
+  const std::string& kernel = outcome.answer.kernel;
+  const char* remedy = "`gnomon mutate --bless` writes it anew";
+  if (!record.score) {
+    outcome.problems.push_back(fmt::format("{} has no score on record: {}", kernel, remedy));
+    return;
+  }
+  if (!sampled && *record.score != outcome.score)
+    outcome.problems.push_back(fmt::format("{}: the score on record is {}, this one {}: {}", kernel,
+                                           scoreText(*record.score), scoreText(outcome.score),
+                                           remedy));
+  const std::string readme = contentOf(root / "README.md");
+  if (withScores(readme, {{kernel, scoreText(*record.score)}}) != readme)
+    outcome.problems.push_back(fmt::format("{}: README.md does not give the score on record, {}: {}",
+                                           kernel, scoreText(*record.score), remedy));
+}
+
+}  // namespace
+
+int mutate(const MutateOptions& given) {
+  MutateOptions options = given;
+  options.session.root = sourceRoot();
+  for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
+  const std::vector<std::string> kernels = mutatedKernels(options.stages);
+  const Policy policy = Policy::load(options.session.root / "tests/policy.json");
+  if (options.bless && (options.sample || !options.operators.empty()))
+    throw UsageError("--bless records the score of a whole run: leave out --sample and --operators");
+  if (options.bless && !options.session.kernels.empty())
+    throw UsageError("--bless records the scores of the project's own kernels: leave out --kernel");
+  Terminal terminal(options.json == "-" ? stderr : stdout);
+
+  const Preparation prepared = prepare(options.session, policy);
+  terminal.print(fmt::format("{}, {}, Vulkan {}, seed {}", prepared.gpu.name, prepared.gpu.driver,
+                             prepared.gpu.api, options.session.seed));
+  const Schedule schedule{options.session, policy, options.jobs.value_or(defaultJobs()),
+                          prepared.errors};
+  Progress progress(terminal);
+  std::vector<Outcome> outcomes;
+  for (const std::string& kernel : kernels) {
+    const bool foreign = options.session.kernels.contains(kernel);
+    const MutantRecord record = foreign ? MutantRecord{}
+                                        : loadMutantRecords(recordFile(options.session.root,
+                                                                       kernel))[kernel];
+    const bool whole = !options.sample && options.operators.empty();
+    Answer answer = inquire(schedule, prepared,
+                            {.kernel = kernel,
+                             .operators = {options.operators.begin(), options.operators.end()},
+                             .sample = options.sample},
+                            progress.of(kernel));
+    outcomes.push_back(outcomeOf(std::move(answer), record, policy, whole));
+    printSurvivors(terminal, outcomes.back());
+    if (!foreign && !options.bless && options.operators.empty())
+      compareWithRecord(outcomes.back(), record, options.session.root, options.sample.has_value());
+  }
+  if (options.bless) bless(outcomes, options.session.root);
+  if (!options.json.empty())
+    writeText(options.json, outcomesJson(outcomes, options, prepared.gpu));
+  terminal.print(outcomeTable(outcomes, terminal));
+  int status = kGood;
+  for (const Outcome& o : outcomes)
+    for (const std::string& problem : o.problems) {
+      terminal.print(terminal.paint(Colour::kRed, problem));
+      status = kWrong;
+    }
+  return status;
+}
+
+}  // namespace gnomon

@@ -1,0 +1,53 @@
+// Everything that is to be known of a kernel's mutants, found out as far as it is not known already.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "harness/mutate/campaign.h"
+#include "harness/mutate/fates.h"
+
+namespace gnomon {
+
+/// What is asked.
+struct Question {
+  std::string kernel{};                ///< "brdf/evaluate"
+  std::set<std::string> operators{};   ///< by name; empty: all
+  std::optional<std::size_t> sample{};  ///< so many of the mutants, chosen by the session's seed
+  unsigned sought = 1;                 ///< kills of each: 2 tells whether a case kills alone
+};
+
+/// What is answered.
+struct Answer {
+  std::string kernel{};
+  std::vector<Mutant> mutants{};     ///< that were judged
+  std::vector<Fate> fates{};         ///< of each
+  std::vector<Mutant> equivalent{};  ///< that need not be
+  std::size_t invalid = 0, duplicates = 0;
+  std::size_t remembered = 0;  ///< fates that an earlier run has found
+  double seconds = 0;
+
+  std::size_t killed() const;
+};
+
+/// Told as it goes on: fates known and mutants in all, killed of them, and what is judged now.
+struct InquiryObserver {
+  std::function<void(std::size_t known, std::size_t all, std::size_t killed,
+                     const std::string& now)>
+      progress{};
+};
+
+/// The kernels of these stages (STAGE or STAGE/ENTRY; none: all) that mutation is for. Throws
+/// UsageError where one does not exist or none is left.
+std::vector<std::string> mutatedKernels(const std::vector<std::string>& stages);
+
+/// Throws CaseFailure where the kernel's own cases fail, UsageError, DeviceError. Without a compiler
+/// of its own it is as quick as the cases: fates are kept in the user's cache.
+Answer inquire(const Schedule& schedule, const Preparation& prepared, const Question& question,
+               const InquiryObserver& observer);
+
+}  // namespace gnomon
