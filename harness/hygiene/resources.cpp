@@ -246,10 +246,12 @@ void Resources::addInputImage(const InputImage& input) {
 void Resources::addOutputImage(const OutputImage& output, Target target) {
   const ImageSpec& spec = record.image(output.image);
   const bool narrow = target == Target::kContract && isNarrow(spec.format);
+  const bool fromBelow = conventions.contains("y") && conventions.at("y") == "up";
+  const unsigned beyond = output.layers == 1 && !fromBelow ? output.beyond : 0;
   const ImageDescription description{
       .format = target == Target::kContract ? spec.format : widened(spec.format),
-      .width = output.width,
-      .height = output.height,
+      .width = output.width + beyond,
+      .height = output.height + beyond,
       .layers = output.layers};
   Output o{.name = narrow ? narrowName(spec) : spec.name,
            .layout = pixelLayout(spec.format),
@@ -340,7 +342,8 @@ Aftermath Resources::run(const GpuProgram& program, std::uint32_t poison) {
     checkKept(memories[i], contents[i], after.strays);
   }
   for (const Output& o : out)
-    after.outputs.push_back(o.isImage() ? downloadImage(o) : unpacked(o, contents));
+    after.outputs.push_back(o.isImage() ? cropped(o, downloadImage(o), poison, after.strays)
+                                        : unpacked(o, contents));
   return after;
 }
 
@@ -422,6 +425,32 @@ Bytes Resources::unpacked(const Output& output, const std::vector<Bytes>& conten
              std::span(elements).subspan(e * size, size), conventions);
   }
   return elements;
+}
+
+Bytes Resources::cropped(const Output& output, Bytes texels, std::uint32_t poison,
+                         std::vector<std::string>& strays) const {
+  const ImageDescription& image = output.image.description();
+  if (texels.size() == output.dataBytes()) return texels;
+  const std::size_t pixel = output.layout.size, height = output.elements / output.width;
+  Bytes inside;
+  bool touched = false;
+  for (std::size_t y = 0; y < image.height; ++y)
+    for (std::size_t x = 0; x < image.width; ++x) {
+      const auto at = std::span(texels).subspan((y * image.width + x) * pixel, pixel);
+      if (x < output.width && y < height) {
+        inside.insert(inside.end(), at.begin(), at.end());
+        continue;
+      }
+      for (std::size_t w = 0; w < pixel / kWord && !touched; ++w) {
+        std::uint32_t word = 0;
+        std::memcpy(&word, at.data() + w * kWord, kWord);
+        touched = word != output.poisoned(poison, w);
+        if (touched)
+          strays.push_back(fmt::format("wrote beyond the {}x{} pixels of '{}', at ({}, {})",
+                                       output.width, height, output.name, x, y));
+      }
+    }
+  return inside;
 }
 
 Bytes Resources::downloadImage(const Output& output) const {

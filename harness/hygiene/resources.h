@@ -102,6 +102,9 @@ class Resources {
   void checkKept(const Memory& memory, const Bytes& whole, std::vector<std::string>& strays) const;
   Bytes unpacked(const Output& output, const std::vector<Bytes>& memories) const;
   Bytes downloadImage(const Output& output) const;
+  /// The part of an image that is to be written; what is beyond it has to be poison still.
+  Bytes cropped(const Output& output, Bytes texels, std::uint32_t poison,
+                std::vector<std::string>& strays) const;
   std::string inputPlace(const Memory& memory, std::size_t byte) const;
 
   Gpu& gpu;

@@ -33,6 +33,9 @@ struct InputImage {
 struct OutputImage {
   std::string image{};
   unsigned width = 1, height = 1, layers = 1;
+  /// Pixels that the image is wider and higher than what is to be written: they stay as they are.
+  /// Of an image without layers; left out where a foreign kernel counts rows from below.
+  unsigned beyond = 0;
 };
 
 struct Stimulus {

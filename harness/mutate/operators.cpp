@@ -431,6 +431,22 @@ void removal(const Site& site) {
 
 // ---- store: forgotten ------------------------------------------------------------------------
 
+bool isZero(const ModuleView& view, SpirvId id) {
+  const auto definition = view.definition(id);
+  switch (view.opcodeOf(id)) {
+    case spv::OpConstantNull:
+    case spv::OpConstantFalse:
+      return true;
+    case spv::OpConstant:
+      return std::ranges::all_of(definition.subspan(kResult), [](auto w) { return w == 0; });
+    case spv::OpConstantComposite:
+      return std::ranges::all_of(definition.subspan(kResult),
+                                 [&](SpirvId part) { return isZero(view, part); });
+    default:
+      return false;
+  }
+}
+
 void store(const Site& site) {
   const auto words = site.words();
   if (site.opcode() == spv::OpImageWrite || site.opcode() == spv::OpAtomicStore) {
@@ -438,7 +454,7 @@ void store(const Site& site) {
     edit.put(spv::OpNop, {});
     site.propose("store", std::move(edit));
   }
-  if (site.opcode() != spv::OpStore) return;
+  if (site.opcode() != spv::OpStore || isZero(site.view, words[2])) return;
   const SpirvId pointerType = site.view.typeOf(words[1]);
   const bool local = site.view.definition(pointerType)[2] == spv::StorageClassFunction;
   Edit edit = site.edit(local ? fmt::format("{} is 0", site.view.nameOf(words[1]))

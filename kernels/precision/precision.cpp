@@ -84,6 +84,7 @@ KernelRecord sample(const char* name, PixelFormat format, SamplerDescription sam
                       .sampler = sampler}},
           .push = describe<Measure>("Measure", field("count", &Measure::count)),
           .features = {"scalarBlockLayout"},
+          .mutates = false,
           .summary = compares ? "device model: comparisons with the nearest texel"
                               : "device model: textureLod of one format, filter and address mode"};
 }

@@ -1,10 +1,11 @@
 #include "tests/brdf/domains.h"
 
-#include <array>
-#include <limits>
+#include <cmath>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+
+#include "harness/cases/special_floats.h"
 
 namespace gnomon::brdf {
 namespace {
@@ -95,13 +96,9 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 }
 
 std::vector<Sample> degenerate() {
-  using Limits = std::numeric_limits<float>;
-  const std::array special = {0.0f, -0.0f, 1.0f, -1.0f, 0.5f, 2.0f, -2.0f, Limits::min(),
-                              -Limits::min(), Limits::denorm_min(), Limits::max(), Limits::lowest(),
-                              Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(),
-                              -Limits::quiet_NaN(), kMinRoughness, kShortestHalf, kMinNoV,
-                              // Whose squares underflow or overflow, and, nearer, do not.
-                              1e-10f, 1e10f, 1e-30f, 1e30f};
+  // The last ones: whose squares underflow or overflow, and, nearer, do not.
+  const std::vector<float> special = specialFloats(
+      {kMinRoughness, kShortestHalf, kMinNoV, 1e-10f, 1e10f, 1e-30f, 1e30f});
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
                         .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),
@@ -134,6 +131,16 @@ std::vector<Sample> degenerate() {
   Sample opposite = ordinary;
   opposite.light = -opposite.view;
   all.push_back(opposite);
+  // The half vector's largest component at its least length, next to it, and a little above it. The
+  // sum of -1 and 1 is 0 to the bit, so it is the light's x.
+  for (const float x : {kShortestHalf, std::nextafter(kShortestHalf, 0.0f),
+                        std::nextafter(kShortestHalf, 1.0f), 1.00005f * kShortestHalf}) {
+    Sample shortest = ordinary;
+    shortest.normal = {1, 0, 0};
+    shortest.view = {0, 0, -1};
+    shortest.light = {x, 0, 1};
+    all.push_back(shortest);
+  }
   Sample behind = ordinary;
   behind.view = behind.light = -behind.normal;  // NoH = -1, where a clamped cosine leaves d = 0
   all.push_back(behind);

@@ -13,6 +13,7 @@
 
 #include "harness/cases/kernel_case.h"
 #include "harness/cases/random.h"
+#include "harness/cases/special_floats.h"
 #include "reference/post/views.h"
 
 namespace gnomon::post {
@@ -83,11 +84,14 @@ class PostViews : public KernelCase {
  protected:
   PostViews() : KernelCase("post/views") {}
 
-  Observation dispatch(const Scene& scene) {
+  Observation dispatch(const Scene& scene, unsigned beyond = 0) {
     return run(
         {.inputImages = {floatImage("albedo", scene.albedo), floatImage("normal", scene.normal),
                          floatImage("depth", scene.depth)},
-         .outputImages = {{"target", scene.push.size.x, scene.push.size.y}},
+         .outputImages = {{.image = "target",
+                           .width = scene.push.size.x,
+                           .height = scene.push.size.y,
+                           .beyond = beyond}},
          .push = std::as_bytes(std::span(&scene.push, 1)),
          .extent = {scene.push.size.x, scene.push.size.y}});
   }
@@ -120,6 +124,14 @@ TEST_F(PostViews, EverySizeAroundAGroupIsWrittenExactly) {
   }
 }
 
+TEST_F(PostViews, PixelsBeyondTheSizeAreNotTouched) {
+  for (const uvec2 size : {uvec2(kGroupSide + 5, kGroupSide), uvec2(kGroupSide, kGroupSide + 5)}) {
+    const Scene scene = generatedScene(size, caseSeed());
+    expectClean(dispatch(scene, kGroupSide));
+    checked(std::size_t{size.x} * size.y);
+  }
+}
+
 TEST_F(PostViews, AnUnknownModeShowsAlbedo) {
   Scene scene = generatedScene({16, 16}, caseSeed());
   for (const uint mode : {3u, 10u, 12u, ~0u}) {
@@ -129,28 +141,19 @@ TEST_F(PostViews, AnUnknownModeShowsAlbedo) {
 }
 
 TEST_F(PostViews, BadInputCountsAsTheContractSays) {
-  using Limits = std::numeric_limits<float>;
-  constexpr std::array kSpecial = {0.0f,
-                                   -0.0f,
-                                   1.0f,
-                                   -1.0f,
-                                   2.0f,
-                                   Limits::denorm_min(),
-                                   Limits::min(),
-                                   Limits::max(),
-                                   Limits::lowest(),
-                                   Limits::infinity(),
-                                   -Limits::infinity(),
-                                   Limits::quiet_NaN()};
-  const uvec2 size(kSpecial.size(), kSpecial.size());
+  const std::vector<float> special = specialFloats({3.0f});
+  const auto n = static_cast<uint>(special.size());
+  const uvec2 size(3 * n, n);
   Scene scene{.push = camera(size), .albedo = {size}, .normal = {size}, .depth = {size}};
-  for (const float a : kSpecial)
-    for (const float b : kSpecial) {
-      scene.albedo.texels.emplace_back(a, 0.5f, b, 0);
-      scene.normal.texels.emplace_back(0.5f, b, a, 0);
+  for (uint y = 0; y < size.y; ++y)
+    for (uint x = 0; x < size.x; ++x) {
+      vec4 colour(0.25f, 0.5f, 0.75f, 0);
+      colour[static_cast<int>(x % 3)] = special[x / 3];
+      scene.albedo.texels.push_back(colour);
+      scene.normal.texels.push_back(colour);
       // A denormal may be flushed to the sky, so it is ambiguous: once is enough.
-      const bool again = b == Limits::denorm_min() && a != 0;
-      scene.depth.texels.emplace_back(again ? 0.5f : b, 0, 0, 0);
+      const bool again = special[y] == std::numeric_limits<float>::denorm_min() && x > 0;
+      scene.depth.texels.emplace_back(again ? 0.5f : special[y], 0, 0, 0);
     }
   for (const uint mode : kModes) {
     scene.push.mode = mode;

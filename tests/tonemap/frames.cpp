@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "harness/cases/random.h"
+#include "harness/cases/special_floats.h"
 #include "harness/image/exr.h"
 
 namespace gnomon::tonemap {
@@ -72,23 +73,7 @@ Frame highlights(const uvec2& size, std::uint64_t seed) {
 }
 
 Frame degenerate() {
-  using Limits = std::numeric_limits<float>;
-  const std::array special = {0.0f,
-                              -0.0f,
-                              1.0f,
-                              -1.0f,
-                              0.0031308f,
-                              65504.0f,
-                              kMaxScene,
-                              Limits::min(),
-                              -Limits::min(),
-                              Limits::denorm_min(),
-                              Limits::max(),
-                              Limits::lowest(),
-                              Limits::infinity(),
-                              -Limits::infinity(),
-                              Limits::quiet_NaN(),
-                              -Limits::quiet_NaN()};
+  const std::vector<float> special = specialFloats({0.0031308f, 65504.0f, kMaxScene});
   const auto n = static_cast<uint>(special.size());
   const uvec2 size(3 * n, 3 * n);
   Frame frame{.push = {.size = size,
@@ -106,6 +91,27 @@ Frame degenerate() {
       frame.hdr.texels.push_back(hdr);
       frame.bloom.texels.push_back(bloom);
     }
+  return frame;
+}
+
+Frame thresholds() {
+  constexpr float kSmallest = std::numeric_limits<float>::min(), kSrgbEnd = 0.0031308f;
+  std::vector<float> values;
+  for (const float x : {kSmallest, kSrgbEnd, 1.0f})
+    for (const float scale : {0.99995f, 1.0f, 1.00005f})
+      for (const float towards : {0.0f, 2.0f, scale * x}) {
+        const float value = std::nextafter(scale * x, towards);
+        if (value >= kSmallest) values.push_back(value);  // a denormal may be flushed: ambiguous
+      }
+  const uvec2 size(values.size(), 1);
+  Frame frame{.push = {.size = size,
+                       .exposure = 1,
+                       .bloomIntensity = 0,
+                       .curve = kLinear,
+                       .transfer = kNone},
+              .hdr = {.size = size},
+              .bloom = {.size = {1, 1}, .texels = {vec4(0)}}};
+  for (const float x : values) frame.hdr.texels.emplace_back(x, x, x, 1);
   return frame;
 }
 

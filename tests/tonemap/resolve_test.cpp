@@ -25,13 +25,18 @@ class TonemapResolve : public KernelCase {
  protected:
   TonemapResolve() : KernelCase("tonemap/resolve") {}
 
-  Observation dispatch(const Frame& frame) {
-    return dispatch(frame.push, floatImage("hdr", frame.hdr), floatImage("bloom", frame.bloom));
+  Observation dispatch(const Frame& frame, unsigned beyond = 0) {
+    return dispatch(frame.push, floatImage("hdr", frame.hdr), floatImage("bloom", frame.bloom),
+                    beyond);
   }
 
-  Observation dispatch(const Resolve& push, const InputImage& hdr, const InputImage& bloom) {
+  Observation dispatch(const Resolve& push, const InputImage& hdr, const InputImage& bloom,
+                       unsigned beyond = 0) {
     return run({.inputImages = {hdr, bloom},
-                .outputImages = {{"target", push.size.x, push.size.y}},
+                .outputImages = {{.image = "target",
+                                  .width = push.size.x,
+                                  .height = push.size.y,
+                                  .beyond = beyond}},
                 .push = std::as_bytes(std::span(&push, 1)),
                 .extent = {push.size.x, push.size.y}});
   }
@@ -86,6 +91,23 @@ TEST_F(TonemapResolve, BadInputCountsAsTheContractSays) {
   for (const float exposure : {0x1p-32f, 0.75f, 0x1p32f}) {
     frame.push.exposure = exposure;
     expectEveryCombinationInsideTheBound(frame);
+  }
+}
+
+TEST_F(TonemapResolve, EveryPieceOfATransferFunctionEndsWhereItShould) {
+  Frame frame = thresholds();
+  for (const uint transfer : kTransfers) {
+    frame.push.transfer = transfer;
+    expectInsideTheBound(frame);
+  }
+}
+
+TEST_F(TonemapResolve, PixelsBeyondTheSizeAreNotTouched) {
+  for (const uvec2 size : {uvec2(kGroupSide + 5, kGroupSide), uvec2(kGroupSide, kGroupSide + 5),
+                           uvec2(1, 1)}) {
+    const Frame frame = bulk(size, caseSeed());
+    expectClean(dispatch(frame, kGroupSide));
+    checked(std::size_t{size.x} * size.y);
   }
 }
 
