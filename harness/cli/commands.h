@@ -31,9 +31,13 @@ struct ListOptions {
   std::string what;    ///< stages, kernels or cases
   bool kills = false;  ///< of cases: which mutants each kills
   std::vector<std::string> stages;
+  SessionOptions session;          ///< where --kills has to find out
+  std::optional<unsigned> jobs{};  ///< the same
   std::string json;
 };
 int list(const ListOptions& options);
+/// The part of it that runs kernels.
+int listKills(const ListOptions& options);
 
 struct ValidateOptions {
   SessionOptions session;

@@ -1,9 +1,10 @@
-#include <map>
+#include <algorithm>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "harness/cli/commands.h"
+#include "harness/error.h"
 #include "harness/program/kernel.h"
 #include "harness/report/summary.h"
 
@@ -33,9 +34,19 @@ std::vector<Line> listKernels(const std::vector<CaseName>& cases) {
   return lines;
 }
 
+void printColumns(const std::vector<Line>& lines) {
+  std::size_t width = 0;
+  for (const Line& l : lines) width = std::max(width, l.name.size());
+  for (const Line& l : lines)
+    fmt::print("{}\n", l.note.empty() ? l.name : fmt::format("{:<{}}  {}", l.name, width, l.note));
+}
+
 }  // namespace
 
 int list(const ListOptions& options) {
+  if (options.kills && options.what != "cases")
+    throw UsageError("--kills is of cases: gnomon list cases --kills");
+  if (options.kills) return listKills(options);
   const std::vector<CaseName> cases = selectCases({.stages = options.stages, .filter = {}});
   std::vector<Line> lines;
   if (options.what == "stages") lines = listStages(cases);
@@ -43,8 +54,7 @@ int list(const ListOptions& options) {
   if (options.what == "cases")
     for (const CaseName& c : cases) lines.push_back({c.name, ""});
   if (options.json != "-")
-    for (const Line& l : lines)
-      fmt::print("{}\n", l.note.empty() ? l.name : fmt::format("{:<20} {}", l.name, l.note));
+    printColumns(lines);
   if (!options.json.empty()) {
     auto array = nlohmann::json::array();
     for (const Line& l : lines) array.push_back(l.name);

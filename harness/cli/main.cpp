@@ -99,7 +99,15 @@ void addList(CLI::App& app, Action& action) {
       ->required()
       ->check(CLI::IsMember({"stages", "kernels", "cases"}));
   command->add_option("stages", options->stages, "STAGE or STAGE/ENTRY (default: all)");
-  command->add_option("--json", options->json, "Write as JSON to FILE, or -")->type_name("FILE");
+  CLI::Option* kills = command->add_flag(
+      "--kills", options->kills,
+      "Of cases: how many mutants each kills, and which no other does; what `mutate` has not found "
+      "out yet is run. The flags below are for that");
+  command->add_option("--jobs", options->jobs, kJobs)
+      ->check(CLI::PositiveNumber)
+      ->type_name("N")
+      ->needs(kills);
+  addSessionOptions(*command, options->session, options->json);
   command->callback([&action, options] { action = [options] { return list(*options); }; });
 }
 

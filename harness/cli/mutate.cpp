@@ -1,4 +1,4 @@
-#include <chrono>
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -7,10 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/mutation.h"
 #include "harness/error.h"
-#include "harness/isolate/worker.h"
 #include "harness/mutate/explained.h"
-#include "harness/mutate/inquiry.h"
 #include "harness/report/summary.h"
 #include "harness/report/terminal.h"
 
@@ -18,7 +17,6 @@ namespace gnomon {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 /// A mutant that no case tells from the kernel.
 struct Survivor {
@@ -162,37 +160,6 @@ std::string outcomesJson(const std::vector<Outcome>& outcomes, const MutateOptio
          "\n";
 }
 
-/// What the progress line says, and how long it may take.
-class Progress {
- public:
-  explicit Progress(Terminal& t) : terminal(t) {}
-
-  InquiryObserver of(const std::string& kernel) {
-    begin = Clock::now();
-    first.reset();
-    return {[this, kernel](std::size_t known, std::size_t all, std::size_t killed,
-                           const std::string& now) {
-      if (!first && known > 0) first = known;  // that cost nothing
-      terminal.progress(fmt::format("{} [{}/{}] {} killed{}: {}", kernel, known, all, killed,
-                                    left(known, all), now));
-    }};
-  }
-
- private:
-  std::string left(std::size_t known, std::size_t all) const {
-    const std::size_t done = known - first.value_or(0);
-    if (done < 8) return "";  // too few to tell
-    const double spent = std::chrono::duration<double>(Clock::now() - begin).count();
-    const double seconds = spent / static_cast<double>(done) * static_cast<double>(all - known);
-    return seconds < 60 ? fmt::format(", about {:.0f} s left", seconds)
-                        : fmt::format(", about {:.0f} min left", seconds / 60);
-  }
-
-  Terminal& terminal;
-  Clock::time_point begin{};
-  std::optional<std::size_t> first{};
-};
-
 std::string contentOf(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -233,44 +200,34 @@ void compareWithRecord(Outcome& outcome, const MutantRecord& record, const fs::p
 
 }  // namespace
 
-int mutate(const MutateOptions& given) {
-  MutateOptions options = given;
-  options.session.root = sourceRoot();
-  for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
+int mutate(const MutateOptions& options) {
   const std::vector<std::string> kernels = mutatedKernels(options.stages);
-  const Policy policy = Policy::load(options.session.root / "tests/policy.json");
-  if (options.bless && (options.sample || !options.operators.empty()))
+  const bool whole = !options.sample && options.operators.empty();
+  if (options.bless && !whole)
     throw UsageError("--bless records the score of a whole run: leave out --sample and --operators");
   if (options.bless && !options.session.kernels.empty())
     throw UsageError("--bless records the scores of the project's own kernels: leave out --kernel");
-  Terminal terminal(options.json == "-" ? stderr : stdout);
+  Mutation mutation(options.session, options.jobs, options.json);
+  const fs::path& root = mutation.session().root;
+  Terminal& terminal = mutation.terminal();
 
-  const Preparation prepared = prepare(options.session, policy);
-  terminal.print(fmt::format("{}, {}, Vulkan {}, seed {}", prepared.gpu.name, prepared.gpu.driver,
-                             prepared.gpu.api, options.session.seed));
-  const Schedule schedule{options.session, policy, options.jobs.value_or(defaultJobs()),
-                          prepared.errors};
-  Progress progress(terminal);
   std::vector<Outcome> outcomes;
   for (const std::string& kernel : kernels) {
-    const bool foreign = options.session.kernels.contains(kernel);
-    const MutantRecord record = foreign ? MutantRecord{}
-                                        : loadMutantRecords(recordFile(options.session.root,
-                                                                       kernel))[kernel];
-    const bool whole = !options.sample && options.operators.empty();
-    Answer answer = inquire(schedule, prepared,
-                            {.kernel = kernel,
-                             .operators = {options.operators.begin(), options.operators.end()},
-                             .sample = options.sample},
-                            progress.of(kernel));
-    outcomes.push_back(outcomeOf(std::move(answer), record, policy, whole));
+    const bool ours = !options.session.kernels.contains(kernel);
+    const MutantRecord record =
+        ours ? loadMutantRecords(recordFile(root, kernel))[kernel] : MutantRecord{};
+    Answer answer =
+        mutation.ask({.kernel = kernel,
+                      .operators = {options.operators.begin(), options.operators.end()},
+                      .sample = options.sample});
+    outcomes.push_back(outcomeOf(std::move(answer), record, mutation.policy(), whole));
     printSurvivors(terminal, outcomes.back());
-    if (!foreign && !options.bless && options.operators.empty())
-      compareWithRecord(outcomes.back(), record, options.session.root, options.sample.has_value());
+    if (ours && !options.bless && options.operators.empty())
+      compareWithRecord(outcomes.back(), record, root, options.sample.has_value());
   }
-  if (options.bless) bless(outcomes, options.session.root);
+  if (options.bless) bless(outcomes, root);
   if (!options.json.empty())
-    writeText(options.json, outcomesJson(outcomes, options, prepared.gpu));
+    writeText(options.json, outcomesJson(outcomes, options, mutation.gpu()));
   terminal.print(outcomeTable(outcomes, terminal));
   int status = kGood;
   for (const Outcome& o : outcomes)

@@ -10,6 +10,9 @@ namespace gnomon {
 struct Kill {
   std::string by{};   ///< the case's name
   std::string how{};  ///< first line of its message, or how its worker died
+
+  /// Without the size of the subgroups in which it failed.
+  std::string caseName() const { return by.substr(0, by.find(' ')); }
 };
 
 struct Fate {
