@@ -16,6 +16,13 @@ class Policy {
   /// A value; throws std::logic_error for a name that is not in the file.
   double operator[](const std::string& name) const;
 
+  /// The same with one value changed.
+  Policy with(const std::string& name, double value) const {
+    Policy changed = *this;
+    changed.values[name] = value;
+    return changed;
+  }
+
  private:
   std::map<std::string, double> values;
 };

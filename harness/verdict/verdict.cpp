@@ -347,6 +347,7 @@ class Judge {
   void requirePlainNearby() {
     if (result.plainBudget > policy["plainBudget"]) {
       result.worst = worstPlain;
+      result.rearranged = true;
       result.problems.push_back(fmt::format(
           "the strict twin is inside, but the module as it is uses {:.3g} budgets where "
           "at most {:.0f} can be rearrangement",
@@ -426,14 +427,8 @@ std::string fieldTable(const Verdict& v) {
 }
 
 std::string worstElement(const Offender& o, const Expectation& expected) {
-  std::string text = fmt::format("worst: {}.{}\n", placeOf(expected, o.element), o.field);
-  text += fmt::format("  got       {} (strict twin), {} (module as it is)\n", number(o.got),
-                      number(o.gotPlain));
-  text += fmt::format("  allowed   [{}, {}]\n", number(o.lo), number(o.hi));
-  text += fmt::format("  model     {}", number(o.value));
-  if (o.value != 0)
-    text += fmt::format(", so it is off by {:.3g} %", 100 * std::abs(o.got / o.value - 1));
-  return text + "\n  for the input\n" + expected.inputs(o.element);
+  return fmt::format("worst: {}.{}\n", placeOf(expected, o.element), o.field) + explainNumbers(o) +
+         "  for the input\n" + expected.inputs(o.element);
 }
 
 /// Fields stand in the contract in the order in which they are computed.
@@ -485,6 +480,11 @@ Verdict judge(const Struct& layout, const Observation& seen, const Expectation& 
 
 std::string explain(const Verdict& v, const Expectation& expected) {
   if (v.ok() && v.outsideDevice == 0) return {};
+  const Offender* worst = worstOf(v);
+  return explainFields(v) + (worst != nullptr ? worstElement(*worst, expected) : "");
+}
+
+std::string explainFields(const Verdict& v) {
   std::string text;
   for (const std::string& p : v.problems) text += "- " + p + "\n";
   const std::size_t out = std::max(v.outside, v.outsideDevice);
@@ -498,9 +498,23 @@ std::string explain(const Verdict& v, const Expectation& expected) {
     text += fmt::format("The first field that is wrong, in the order of the contract, is {}.\n",
                         first->name);
   }
-  const std::optional<Offender>& worst = first != nullptr ? first->worst : v.worst;
-  if (worst && worst->budget > 1) text += worstElement(*worst, expected);
   return text;
+}
+
+std::string explainNumbers(const Offender& o) {
+  std::string text = fmt::format("  got       {} (strict twin), {} (module as it is)\n",
+                                 number(o.got), number(o.gotPlain));
+  text += fmt::format("  allowed   [{}, {}]\n", number(o.lo), number(o.hi));
+  text += fmt::format("  model     {}", number(o.value));
+  if (o.value != 0)
+    text += fmt::format(", so it is off by {:.3g} %", 100 * std::abs(o.got / o.value - 1));
+  return text + "\n";
+}
+
+const Offender* worstOf(const Verdict& v) {
+  const FieldVerdict* first = firstOutside(v);
+  const std::optional<Offender>& worst = first != nullptr ? first->worst : v.worst;
+  return worst && worst->budget > 1 ? &*worst : nullptr;
 }
 
 }  // namespace gnomon

@@ -79,6 +79,7 @@ struct Verdict {
   /// Of them judged by intervals. The rest was cleared by the model; or left alone, where the first
   /// thousands showed that the kernel is wrong at large.
   std::size_t bounded = 0;
+  bool rearranged = false;  ///< the twin is inside, the module as it is further than it may be
   bool truncated = false;         ///< wrong at large, so the rest was left alone
   std::size_t outside = 0;        ///< elements of the twin outside the specification's bound
   std::size_t outsideDevice = 0;  ///< outside the device's bound
@@ -104,5 +105,11 @@ double budgetUsed(double got, const Bounded& allowed, bool signOfZero);
 /// A verdict in words for a person: what is wrong, which fields are not, the worst element with
 /// its inputs and what was allowed. Empty for a clean verdict.
 std::string explain(const Verdict& verdict, const Expectation& expected);
+
+/// Its parts: what is wrong and which fields are not; and one scalar, got and allowed.
+std::string explainFields(const Verdict& verdict);
+std::string explainNumbers(const Offender& offender);
+/// The scalar that a message is about: the worst of the first field outside. Null for none.
+const Offender* worstOf(const Verdict& verdict);
 
 }  // namespace gnomon
