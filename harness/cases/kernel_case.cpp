@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "harness/cases/case_file.h"
 #include "harness/cases/hash.h"
 #include "harness/error.h"
 #include "harness/hygiene/pack.h"
@@ -80,46 +81,80 @@ void KernelCase::expectClean(const Observation& seen) {
 }
 
 void KernelCase::expectConforms(const Observation& seen, const Expectation& expected) {
-  expectWithin(Session::current().bounds(), seen, expected);
+  if (Session::current().options().replay.empty())
+    expectWithin(standard(), Session::current().policy(), seen, expected, explain);
 }
 
 void KernelCase::expectWithinSpecification(const Observation& seen, const Expectation& expected) {
-  Bounds bounds = Session::current().bounds();
-  bounds.device.reset();
-  expectWithin(bounds, seen, expected);
+  Standard specification = standard();
+  specification.bounds.device.reset();
+  expectWithin(specification, Session::current().policy(), seen, expected, explain);
 }
 
-void KernelCase::expectWithin(const Bounds& bounds, const Observation& seen,
-                              const Expectation& expected) {
-  if (!seen.applies) return;
-  const KernelRecord& contract = Session::current().subject(kernelName).record();
-  const Struct layout = contract.layoutOf(expected.output);
-  record(bounds, seen, expected, layout);
-  if (expected.width == 0) return;
-  const ImageSpec& image = contract.image(expected.output);
-  if (!isNarrow(image.format) || !seen.twin.contains(narrowName(image))) return;
-  Expectation narrow = expected;
-  narrow.output = narrowName(image);
-  narrow.storage = storageOf(image.format);
-  record(bounds, seen, narrow, layout);
-}
-
-void KernelCase::record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
-                        const Struct& layout) {
+// Another arrangement of a user's is as good as ours; ours has to be the model's own, and as exact
+// as this device is.
+Standard KernelCase::standard() const {
   Session& session = Session::current();
-  // Another arrangement of a user's is as good as ours; ours has to be the model's own, and as
-  // exact as this device is.
-  const bool foreign = session.options().kernels.contains(kernelName);
-  Bounds deciding = bounds;
-  if (foreign) deciding.device.reset();
-  Verdict verdict = judge(layout, seen, expected, deciding, session.policy(), caseSeed());
-  checked(verdict.elements);
-  if (!verdict.ok() ||
-      (!foreign && (verdict.outsideDevice > 0 || verdict.verdict != Class::kConforms)))
-    ADD_FAILURE() << session.subject(kernelName).origin() << " is " << nameOf(verdict.verdict)
-                  << "\n"
-                  << explain(verdict, expected);
-  session.currentCase().verdicts.push_back(std::move(verdict));
+  Standard s{.bounds = session.bounds(), .foreign = session.options().kernels.contains(kernelName)};
+  if (s.foreign) s.bounds.device.reset();
+  return s;
+}
+
+void KernelCase::expectWithin(const Standard& by, const Policy& policy, const Observation& seen,
+                              const Expectation& expected, const Explain& explained) {
+  if (!seen.applies) return;
+  Session& session = Session::current();
+  const Subject& subject = session.subject(kernelName);
+  const Struct layout = subject.record().layoutOf(expected.output);
+  for (const Expectation& e : judgedBy(subject.record(), expected)) {
+    if (!seen.twin.contains(e.output)) continue;  // watched in part
+    Verdict verdict = judge(layout, seen, e, by.bounds, policy, caseSeed());
+    checked(verdict.elements);
+    if (by.fails(verdict))
+      ADD_FAILURE() << subject.origin() << " is " << nameOf(verdict.verdict) << "\n"
+                    << explained(verdict, e);
+    session.currentCase().verdicts.push_back(std::move(verdict));
+  }
+}
+
+void KernelCase::judgeGenerated(Generated& generated) {
+  Session& session = Session::current();
+  const std::size_t judgement = judgements++;
+  if (!session.options().replay.empty()) return replay(generated, judgement);
+  const Trial trial = generated.run();
+  if (!trial.seen.applies) return;
+  const KernelRecord& contract = session.subject(kernelName).record();
+  const Standard by = standard();
+  expectWithin(by, session.policy(), trial.seen, trial.expected,
+               [&](const Verdict& verdict, const Expectation& expected) {
+    const std::string asItWas = explain(verdict, expected);
+    // The first failure of a case says most: one is enough to shrink.
+    CaseRecord& found = session.currentCase();
+    if (!session.options().shrinks || !found.messages.empty()) return asItWas;
+    const auto shrunk =
+        shrinkFailure(generated, trial, verdict,
+                      {.record = contract, .standard = by, .judgement = judgement});
+    if (!shrunk) return asItWas;
+    found.shrunk = shrunk->file;
+    return explainFields(verdict) + shrunk->text;
+  });
+}
+
+void KernelCase::replay(Generated& generated, std::size_t judgement) {
+  Session& session = Session::current();
+  const CaseFile file = readCaseFile(session.options().replay);
+  CaseRecord& found = session.currentCase();
+  if (file.judgement != judgement || found.replayed || found.unusable) return;
+  const KernelRecord& contract = session.subject(kernelName).record();
+  found.unusable = generated.take(file.input, contract);
+  if (found.unusable) return;
+  found.replayed = true;
+  const Trial trial = generated.run();
+  expectWithin(standard(), forFewElements(session.policy()), trial.seen, trial.expected,
+               [&](const Verdict& verdict, const Expectation&) {
+                 return explainFields(verdict) + "for the input\n" +
+                        explainInput(generated, verdict, contract);
+               });
 }
 
 std::uint64_t caseSeed() {

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "harness/cases/generated.h"
 #include "harness/cases/picture.h"
 #include "harness/cases/session.h"
 #include "harness/hygiene/observe.h"
@@ -64,16 +65,31 @@ class KernelCase : public testing::Test {
   /// The same under the specification alone, for the stage that measures the device.
   void expectWithinSpecification(const Observation& seen, const Expectation& expected);
 
+  /// The same for a generated input: `property(input)` runs the kernel on it and returns the
+  /// Trial; it may change the input first, into what a kernel can know of it. An input that fails
+  /// is shrunk, and written to a file that replays it. Needs `void parts(Parts&, Input&)`.
+  template <class Input, class Property>
+  void expectConformsOn(Input input, const Property& property) {
+    GeneratedOf<Input, Property> generated(std::move(input), property);
+    judgeGenerated(generated);
+  }
+
   /// Elements that a law was checked on, for the tally.
   void checked(std::size_t elements) { Session::current().currentCase().elements += elements; }
 
   const std::string kernelName;
 
  private:
-  void expectWithin(const Bounds& bounds, const Observation& seen, const Expectation& expected);
+  /// What a message says of a verdict that fails.
+  using Explain = std::function<std::string(const Verdict&, const Expectation&)>;
+
+  Standard standard() const;
+  void judgeGenerated(Generated& generated);
+  void replay(Generated& generated, std::size_t judgement);
+  void expectWithin(const Standard& standard, const Policy& policy, const Observation& seen,
+                    const Expectation& expected, const Explain& explained);
   std::size_t runs = 0, left = 0;  // of run(), and where the kernel did not apply
-  void record(const Bounds& bounds, const Observation& seen, const Expectation& expected,
-              const Struct& layout);
+  std::size_t judgements = 0;      // of generated inputs
 };
 
 /// A seed of its own for every case, from the run's seed and the case's name.

@@ -26,6 +26,9 @@ struct SessionOptions {
   std::optional<std::size_t> cases{};  ///< generated inputs a case, instead of the policy's number
   std::optional<std::chrono::seconds> timeout{};  ///< a case, instead of the policy's number
   std::map<std::string, std::filesystem::path> kernels{};  ///< replaced: "stage/entry" -> file
+  bool shrinks = true;              ///< failing generated inputs, before they are shown
+  std::filesystem::path failures{};  ///< folder that they are written to; empty: nowhere
+  std::filesystem::path replay{};    ///< such a file: its input alone, in place of the case's own
   bool validation = true;  ///< Vulkan's validation layer; off for timing only
 };
 
@@ -50,6 +53,9 @@ struct CaseRecord {
   std::vector<Verdict> verdicts{};
   DeviceErrors measured{};              ///< of the device, by this case
   std::vector<std::string> messages{};  ///< one for each failure
+  std::optional<std::string> shrunk{};  ///< file of the smallest input that fails as the first does
+  bool replayed = false;                ///< SessionOptions::replay was judged
+  std::optional<std::string> unusable{};  ///< why that file says nothing of this case
 };
 
 class Session {

@@ -130,6 +130,11 @@ void addValidate(CLI::App& app, Action& action) {
                    "Write what each case found into DIR, as it comes; after a run that was killed "
                    "the same command goes on where it was")
       ->type_name("DIR");
+  command
+      ->add_option("--replay", o->session.replay,
+                   "Judge one input again: a file that a failure was shrunk to (DIR/failures of "
+                   "--out, else in the user's cache), as its `reproduce:` line says")
+      ->type_name("FILE");
   command->add_option("--junit", o->junit, "Write JUnit XML to FILE")->type_name("FILE");
   addShard(*command, o->selection);
   command->add_option("--jobs", o->jobs, kJobs)->check(CLI::PositiveNumber)->type_name("N");

@@ -56,7 +56,9 @@ void Run::runAt(unsigned width, const std::vector<CaseName>& wanted) {
     tell();
     if (width == 0) tellInOrder();
   };
-  runBatches({options.session, options.policy, options.jobs, errors}, batches,
+  SessionOptions session = options.session;
+  if (width != 0) session.shrinks = false;  // at that width a replay would need its environment
+  runBatches({session, options.policy, options.jobs, errors}, batches,
              {.begun = begin, .ended = end});
   if (width == 0) tellInOrder();
 }

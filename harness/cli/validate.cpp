@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <fstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "harness/cases/case_file.h"
 #include "harness/cases/hash.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/run.h"
@@ -26,7 +28,7 @@ std::string failureText(const Terminal& terminal, const CaseRecord& record,
   if (record.messages.size() > 1)
     text += fmt::format("... and {} more in this case; --out DIR keeps them all\n",
                         record.messages.size() - 1);
-  return text + "reproduce: " + reproduceCommand(record.name, options) + "\n";
+  return text + "reproduce: " + reproduceCommand(record, options) + "\n";
 }
 
 /// A line of how far the run is and what runs now.
@@ -138,6 +140,7 @@ std::string fingerprint(const ValidateOptions& o, const Preparation& prepared) {
                         {"seed", s.seed},
                         {"cases", s.cases.value_or(0)},
                         {"timeout", s.timeout ? s.timeout->count() : 0},
+                        {"replay", hashOf(contentOf(s.replay))},
                         {"prepared", toJson(prepared)},
                         {"policy", hashOf(contentOf(s.root / "tests/policy.json"))},
                         {"executable", hashOf(contentOf(thisExecutable()))}}
@@ -156,6 +159,39 @@ std::optional<Results> openResults(const ValidateOptions& options, const Prepara
     terminal.print(
         fmt::format("{}/results.jsonl was of another run: starting afresh", options.out.string()));
   return results;
+}
+
+/// The file says which case, with which seed; whatever else says so too would contradict it.
+void chooseReplayed(ValidateOptions& options) {
+  if (!options.selection.stages.empty() || !options.selection.filter.empty() ||
+      options.selection.shards > 1 || options.session.cases)
+    throw UsageError(
+        "--replay runs the case of its file alone: drop STAGE, --filter, --shard and --cases");
+  const std::string where = options.session.replay.string();
+  const CaseFile file = readCaseFile(options.session.replay);
+  const std::vector<CaseName> all = selectCases({});
+  const auto found = std::ranges::find(all, file.name, &CaseName::name);
+  if (found == all.end())
+    throw UsageError(fmt::format("{}: there is no case '{}'; `gnomon list cases` prints them",
+                                 where, file.name.substr(0, 80)));
+  if (found->kernel != file.kernel)
+    throw UsageError(fmt::format("{}: the case '{}' is of kernel {}, not of {}", where, file.name,
+                                 found->kernel, file.kernel));
+  options.selection.filter = file.name;
+  options.session.seed = file.seed;
+  options.session.shrinks = false;
+}
+
+/// A replay that has judged nothing is no pass.
+void refuseUnusable(const ValidateOptions& options, const std::vector<CaseRecord>& records) {
+  if (options.session.replay.empty()) return;
+  for (const CaseRecord& r : records) {
+    if (r.replayed || r.failed || r.skipped || r.unsupported) continue;
+    throw UsageError(fmt::format(
+        "{}: not an input of {}: {}.\nRun `gnomon validate --filter '{}'` to find another",
+        options.session.replay.string(), r.name,
+        r.unusable.value_or("the case judges no such input (\"judgement\")"), r.name));
+  }
 }
 
 /// The files asked for and the table; the command's exit status.
@@ -179,6 +215,9 @@ int report(const ValidateOptions& options, Terminal& terminal,
 int validate(const ValidateOptions& given) {
   ValidateOptions options = given;
   options.session.root = sourceRoot();
+  if (!options.session.replay.empty()) chooseReplayed(options);
+  options.session.failures =
+      options.out.empty() ? failuresCache() : std::filesystem::absolute(options.out) / "failures";
   for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
   const std::vector<CaseName> cases = selectCases(options.selection);
   const Policy policy = Policy::load(options.session.root / "tests/policy.json");
@@ -204,6 +243,7 @@ int validate(const ValidateOptions& given) {
                     "was interrupted",
                     run.takenFromFile(), cases.size(), options.out.string()));
   run.judge();
+  refuseUnusable(options, run.records());
   const std::vector<CaseRecord> records = court.judged(run.records());
   tellOfWaivers(terminal, court, records, options.session);
   if (results) writeFindings(options.out, records, run, gpu);

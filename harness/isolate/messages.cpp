@@ -132,6 +132,9 @@ std::string toJson(const WorkerTask& task) {
                {"generated", optional(s.cases)},
                {"timeout", s.timeout ? Json(s.timeout->count()) : Json(nullptr)},
                {"kernels", kernels},
+               {"shrinks", s.shrinks},
+               {"failures", s.failures.string()},
+               {"replay", s.replay.string()},
                {"validation", s.validation},
                {"cases", task.cases},
                {"mutated", task.mutated},
@@ -146,6 +149,9 @@ WorkerTask workerTask(std::string_view json) try {
                               .device = j.at("device"),
                               .seed = j.at("seed"),
                               .cases = optional<std::size_t>(j.at("generated")),
+                              .shrinks = j.at("shrinks"),
+                              .failures = j.at("failures").get<std::string>(),
+                              .replay = j.at("replay").get<std::string>(),
                               .validation = j.at("validation")},
                   .cases = j.at("cases"),
                   .mutated = j.at("mutated"),
@@ -173,7 +179,10 @@ std::string toJson(const CaseRecord& r) {
             {"seconds", r.seconds},
             {"verdicts", Json::array()},
             {"measured", errorsJson(r.measured)},
-            {"messages", r.messages}};
+            {"messages", r.messages},
+            {"shrunk", optional(r.shrunk)},
+            {"replayed", r.replayed},
+            {"unusable", optional(r.unusable)}};
   for (const Verdict& v : r.verdicts) j["verdicts"].push_back(verdictJson(v));
   return text(j);
 }
@@ -190,7 +199,10 @@ CaseRecord caseRecord(std::string_view json) try {
                .elements = j.at("elements"),
                .seconds = j.at("seconds"),
                .measured = deviceErrors(j.at("measured")),
-               .messages = j.at("messages")};
+               .messages = j.at("messages"),
+               .shrunk = optional<std::string>(j.at("shrunk")),
+               .replayed = j.at("replayed"),
+               .unusable = optional<std::string>(j.at("unusable"))};
   for (const Json& v : j.at("verdicts")) r.verdicts.push_back(verdict(v));
   return r;
 } catch (const Json::exception& e) {

@@ -94,7 +94,7 @@ nlohmann::json failuresOf(const KernelSummary& k, const SessionOptions& options)
     if (r->waived) continue;
     for (const std::string& message : r->messages)
       list.push_back({{"case", r->name},
-                      {"reproduce", reproduceCommand(r->name, options)},
+                      {"reproduce", reproduceCommand(*r, options)},
                       {"message", message}});
   }
   return list;
@@ -161,10 +161,15 @@ std::vector<KernelSummary> summarise(const std::vector<CaseRecord>& records) {
   return all;
 }
 
-std::string reproduceCommand(const std::string& caseName, const SessionOptions& options) {
-  std::string command =
-      fmt::format("./gnomon validate --filter '{}' --seed {}", caseName, options.seed);
-  if (options.cases) command += fmt::format(" --cases {}", *options.cases);
+std::string reproduceCommand(const CaseRecord& record, const SessionOptions& options) {
+  std::string command = "./gnomon validate";
+  const std::string input = record.shrunk.value_or(options.replay.string());
+  if (!input.empty()) {
+    command += fmt::format(" --replay '{}'", input);
+  } else {
+    command += fmt::format(" --filter '{}' --seed {}", record.name, options.seed);
+    if (options.cases) command += fmt::format(" --cases {}", *options.cases);
+  }
   if (!options.device.empty()) command += fmt::format(" --device '{}'", options.device);
   if (options.timeout) command += fmt::format(" --timeout {}", options.timeout->count());
   for (const auto& [kernel, file] : options.kernels)

@@ -29,8 +29,9 @@ struct KernelSummary {
 /// One summary for each kernel, in the order of the records.
 std::vector<KernelSummary> summarise(const std::vector<CaseRecord>& records);
 
-/// How to see a case again: the command with device, seed and filter.
-std::string reproduceCommand(const std::string& caseName, const SessionOptions& options);
+/// How to see a case again: the command with device, seed and filter; of a failure that was
+/// shrunk, or replayed, with the file of its input.
+std::string reproduceCommand(const CaseRecord& record, const SessionOptions& options);
 
 /// The table that ends `validate`.
 std::string summaryTable(const std::vector<KernelSummary>& kernels, const Terminal& terminal);

@@ -147,6 +147,8 @@ std::vector<Sample> degenerate() {
   return all;
 }
 
+void parts(Parts& p, std::vector<Sample>& samples) { p.elements("samples", samples); }
+
 std::string describe(const Sample& s) {
   const auto vector = [](const char* name, const vec3& v) {
     return fmt::format("    {:<11}({:.9g}, {:.9g}, {:.9g})\n", name, v.x, v.y, v.z);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/cases/case_input.h"
 #include "harness/cases/random.h"
 #include "kernels/brdf/brdf.h"
 
@@ -25,6 +26,9 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed);
 /// Every field at every special value that floats have, one or two at a time, in an otherwise
 /// ordinary sample.
 std::vector<Sample> degenerate();
+
+/// The parts of an input, for whoever shrinks and replays it.
+void parts(Parts& p, std::vector<Sample>& samples);
 
 /// One sample in words, a line for each field.
 std::string describe(const Sample& sample);

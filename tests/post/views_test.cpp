@@ -71,6 +71,20 @@ Scene generatedScene(const uvec2& size, std::uint64_t seed) {
   return scene;
 }
 
+void parts(Parts& p, Scene& scene) {
+  p.push(scene.push);
+  p.imageOfExtent("albedo", scene.albedo);
+  p.imageOfExtent("normal", scene.normal);
+  p.imageOfExtent("depth", scene.depth);
+  p.extent(scene.push.size);
+}
+
+bool admits(const Scene& scene) {
+  const Views& v = scene.push;
+  return v.near > 0 && v.near < v.splits.x && v.splits.x < v.splits.y && v.splits.y < v.splits.z &&
+         v.splits.z < v.splits.w && v.splits.w == v.far;
+}
+
 std::string describe(const Views& push, const Surface& s) {
   return fmt::format(
       "    mode   {}\n    near   {:.9g}, far {:.9g}, splits {:.9g} {:.9g} {:.9g} {:.9g}\n"
@@ -96,14 +110,19 @@ class PostViews : public KernelCase {
          .extent = {scene.push.size.x, scene.push.size.y}});
   }
 
+  static Expectation modelOf(const Scene& scene) {
+    return pixelsOf(
+        "target", scene.push.size,
+        [&scene]<class T>(std::size_t i) { return view<T>(scene.push, scene.at(i)); },
+        [&scene](std::size_t i) { return describe(scene.push, scene.at(i)); });
+  }
+
   /// The depths are those that the kernel's convention can tell: 1 - d in float loses small ones.
-  void expectInsideTheBound(Scene scene) {
-    recover(scene.depth, "depth");
-    expectConforms(dispatch(scene),
-                   pixelsOf(
-                       "target", scene.push.size,
-                       [&]<class T>(std::size_t i) { return view<T>(scene.push, scene.at(i)); },
-                       [&](std::size_t i) { return describe(scene.push, scene.at(i)); }));
+  void expectInsideTheBound(const Scene& scene) {
+    expectConformsOn(scene, [this](Scene& s) {
+      recover(s.depth, "depth");
+      return Trial{dispatch(s), modelOf(s)};
+    });
   }
 };
 

@@ -138,6 +138,18 @@ Picture halved(const Picture& picture, float scale) {
   return small;
 }
 
+void parts(Parts& p, Frame& frame) {
+  p.push(frame.push);
+  p.imageOfExtent("hdr", frame.hdr);
+  p.image("bloom", frame.bloom);
+  p.extent(frame.push.size);
+}
+
+bool admits(const Frame& frame) {
+  return frame.push.exposure >= 0x1p-32f && frame.push.exposure <= 0x1p32f &&
+         frame.push.bloomIntensity >= 0 && frame.push.bloomIntensity <= 1;
+}
+
 std::string describe(const Frame& frame, std::size_t pixel) {
   const vec4& hdr = frame.hdr.at(pixel);
   const uint x = static_cast<uint>(pixel) % frame.push.size.x;

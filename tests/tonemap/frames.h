@@ -42,6 +42,11 @@ Picture load(const std::filesystem::path& file);
 /// Half as wide and high, every texel the mean of four, times `scale`: stands for bloom.
 Picture halved(const Picture& picture, float scale);
 
+/// The parts of a frame, for whoever shrinks and replays it, and whether the contract admits its
+/// push constants.
+void parts(Parts& p, Frame& frame);
+bool admits(const Frame& frame);
+
 /// One pixel in words, a line for each input.
 std::string describe(const Frame& frame, std::size_t pixel);
 

@@ -52,7 +52,9 @@ class TonemapResolve : public KernelCase {
         [&frame](std::size_t i) { return describe(frame, i); });
   }
 
-  void expectInsideTheBound(const Frame& frame) { expectConforms(dispatch(frame), modelOf(frame)); }
+  void expectInsideTheBound(const Frame& frame) {
+    expectConformsOn(frame, [this](const Frame& f) { return Trial{dispatch(f), modelOf(f)}; });
+  }
 
   void expectEveryCombinationInsideTheBound(Frame frame) {
     for (const uint curve : kCurves)
@@ -143,10 +145,12 @@ TEST_F(TonemapResolve, ASkyWithSunAndSpecksStaysInsideTheBound) {
                        .transfer = kSrgb},
               .hdr = sky,
               .bloom = halved(sky, 0.1f)};
-  const HalfImage hdr("hdr", frame.hdr), bloom("bloom", frame.bloom);
-  frame.hdr = hdr.picture();
-  frame.bloom = bloom.picture();
-  expectConforms(dispatch(frame.push, hdr.input(), bloom.input()), modelOf(frame));
+  expectConformsOn(std::move(frame), [this](Frame& f) {
+    const HalfImage hdr("hdr", f.hdr), bloom("bloom", f.bloom);
+    f.hdr = hdr.picture();
+    f.bloom = bloom.picture();
+    return Trial{dispatch(f.push, hdr.input(), bloom.input()), modelOf(f)};
+  });
 }
 
 TEST_F(TonemapResolve, NanIsBlackAndInfinityIsWhite) {
