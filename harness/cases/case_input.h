@@ -93,10 +93,9 @@ using NameParts = std::function<void(Parts&)>;
 /// The parts as they are.
 CaseInput gather(const KernelRecord& record, const NameParts& named);
 
-/// Puts them back. Nothing, or what does not fit: "the case takes no buffer 'lights'", "push.size
-/// is not that of the images".
-std::optional<std::string> scatter(const CaseInput& input, const KernelRecord& record,
-                                   const NameParts& named);
+/// Puts them back, with what follows from their sizes. Nothing, or what does not fit: "it has no
+/// buffer 'lights'", "'hdr' and 'depth' differ in size".
+std::optional<std::string> scatter(const CaseInput& input, const NameParts& named);
 
 /// Every number, a line for each field or texel; of what is large, the size and the first ones.
 std::string inWords(const CaseInput& input);
@@ -104,7 +103,7 @@ std::string inWords(const CaseInput& input);
 /// "1 element of 'samples'", "hdr of 1 x 1, bloom of 2 x 1".
 std::string sizeInWords(const CaseInput& input);
 
-/// One number so that it reads back as the same bits: nine digits, "-0.0", "NaN 0x7fc00000".
+/// One number so that it reads back as the same bits: "0.004", "-0.0", "NaN 0x7fc00000".
 std::string exactly(float x);
 
 }  // namespace gnomon

@@ -50,7 +50,7 @@ class Retrial {
   }
 
   std::optional<CaseInput> fitted(const CaseInput& candidate) {
-    if (generated.take(candidate, subject.record)) return std::nullopt;
+    if (generated.take(candidate)) return std::nullopt;
     CaseInput taken = generated.gathered(subject.record);
     taken.focus = candidate.focus;
     return taken;
@@ -70,7 +70,7 @@ class Retrial {
   /// The verdict of the candidate by itself, if it fails in the same way.
   std::optional<Verdict> failsAlone(const CaseInput& candidate) {
     Session::current().cameFurther();
-    if (generated.take(candidate, subject.record)) return std::nullopt;
+    if (generated.take(candidate)) return std::nullopt;
     const Trial trial = generated.run();
     if (!trial.seen.applies) return std::nullopt;
     for (const Expectation& e : judgedBy(subject.record, trial.expected)) {
@@ -92,7 +92,7 @@ class Retrial {
                                   c.buffers[0].bytes.end());
     Session::current().cameFurther();
     clean = false;
-    if (generated.take(all, subject.record)) return std::nullopt;
+    if (generated.take(all)) return std::nullopt;
     const Trial trial = generated.run();
     if (!trial.seen.applies || !trial.seen.findings.empty() ||
         trial.expected.elements != candidates.size())
@@ -130,7 +130,7 @@ uvec2 focusOf(const Trial& trial, const Verdict& v) {
 std::string whatItDoes(const Failure& f) {
   switch (f.kind) {
     case Failure::Kind::kHygiene:
-      return "that is handled so";
+      return "with the same finding";
     case Failure::Kind::kOutside:
       return fmt::format("whose {} is outside", f.field);
     case Failure::Kind::kRearranged:
@@ -140,15 +140,13 @@ std::string whatItDoes(const Failure& f) {
 }
 
 std::string story(const Shrunk& s, const Failure& f) {
-  if (s.steps == 0 && s.finished)
-    return fmt::format("No simpler input was found {} than this one ({} tried):\n", whatItDoes(f),
-                       s.trials);
-  const std::string steps = fmt::format("{} step{}", s.steps, s.steps == 1 ? "" : "s");
-  return s.finished ? fmt::format("Shrunk in {} ({} inputs tried) to the simplest {}:\n", steps,
-                                  s.trials, whatItDoes(f))
-                    : fmt::format("Shrunk in {} ({} inputs tried), while there was time, to one "
-                                  "{}:\n",
-                                  steps, s.trials, whatItDoes(f));
+  const std::string tried =
+      fmt::format("{} input{} tried", s.trials, s.trials == 1 ? "" : "s");
+  if (s.steps == 0)
+    return fmt::format("No simpler input {} was found ({}) than:\n", whatItDoes(f), tried);
+  return fmt::format("Shrunk in {} step{} ({}) to {} {}:\n", s.steps, s.steps == 1 ? "" : "s",
+                     tried, s.finished ? "the simplest" : "what there was time for, an input",
+                     whatItDoes(f));
 }
 
 std::optional<std::string> written(const CaseInput& input, const Failure& f,
@@ -184,14 +182,11 @@ std::vector<Expectation> judgedBy(const KernelRecord& record, const Expectation&
 
 std::string explainInput(Generated& generated, const Verdict& verdict, const KernelRecord& record) {
   const CaseInput input = generated.gathered(record);
-  std::string text = inWords(input);
-  if (const std::string size = sizeInWords(input); !size.empty() && input.numbers() > 0)
-    text = fmt::format("  {}\n", size) + text;
+  std::string text = fmt::format("  {}\n", sizeInWords(input)) + inWords(input);
+  for (const std::string& p : verdict.problems) text += "  - " + p + "\n";
+  // What was not written, or written twice, has no numbers of its own.
   const Offender* worst = worstOf(verdict);
-  // Hygiene has no numbers of its own: what it says of this input.
-  if (worst == nullptr)
-    for (const std::string& p : verdict.problems) text += "  - " + p + "\n";
-  else
+  if (worst != nullptr && (verdict.problems.empty() || verdict.rearranged))
     text += fmt::format("  {}.{}\n", verdict.output, worst->field) + explainNumbers(*worst);
   return text;
 }
@@ -204,11 +199,10 @@ std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& tr
   CaseInput original = generated.gathered(subject.record);
   original.focus = focusOf(trial, verdict);
   const struct Restore {  // the trial still refers to the input
-    ~Restore() { generated.take(input, record); }
+    ~Restore() { generated.take(input); }
     Generated& generated;
     const CaseInput& input;
-    const KernelRecord& record;
-  } restore{generated, original, subject.record};
+  } restore{generated, original};
   Retrial retrial(generated, subject, *failure);
   const Trials trials{
       .fitted = [&](const CaseInput& c) { return retrial.fitted(c); },

@@ -27,8 +27,8 @@ class Generated {
   virtual ~Generated() = default;
 
   virtual CaseInput gathered(const KernelRecord& record) = 0;
-  /// Becomes that input; or why it cannot.
-  virtual std::optional<std::string> take(const CaseInput& input, const KernelRecord& record) = 0;
+  /// Becomes that input, with what follows from its sizes; or why it cannot.
+  virtual std::optional<std::string> take(const CaseInput& input) = 0;
   /// Valid until the next take().
   virtual Trial run() = 0;
 };
@@ -50,8 +50,8 @@ class GeneratedOf : public Generated {
 
   CaseInput gathered(const KernelRecord& record) override { return gather(record, names()); }
 
-  std::optional<std::string> take(const CaseInput& other, const KernelRecord& record) override {
-    if (auto misfit = scatter(other, record, names())) return misfit;
+  std::optional<std::string> take(const CaseInput& other) override {
+    if (auto misfit = scatter(other, names())) return misfit;
     if (!contractAdmits(input)) return "the kernel's contract does not admit its numbers";
     return std::nullopt;
   }
