@@ -72,8 +72,8 @@ std::string imageJson(const CaseInput::Image& image) {
     texels.push_back(fmt::format("    [{}, {}, {}, {}]", floatJson(t.x), floatJson(t.y),
                                  floatJson(t.z), floatJson(t.w)));
   return fmt::format("{}: {{\"size\": [{}, {}], \"ofExtent\": {}, \"texels\": [\n{}]}}",
-                     quoted(image.name), image.picture.size.x, image.picture.size.y,
-                     image.ofExtent, fmt::join(texels, ",\n"));
+                     quoted(image.name), image.picture.size.x, image.picture.size.y, image.ofExtent,
+                     fmt::join(texels, ",\n"));
 }
 
 std::string inputJson(const CaseInput& input) {
@@ -162,8 +162,8 @@ void requireKeys(const Json& object, const std::vector<std::string>& known,
   if (!object.is_object()) refuse(where, "is not an object");
   for (const auto& [key, unused] : object.items())
     if (std::ranges::find(known, key) == known.end())
-      refuse(where, fmt::format("has no \"{}\"; there are {}", key.substr(0, 40),
-                                fmt::join(known, ", ")));
+      refuse(where,
+             fmt::format("has no \"{}\"; there are {}", key.substr(0, 40), fmt::join(known, ", ")));
 }
 
 void readElement(const Json& j, const Struct& layout, std::span<std::byte> element,
@@ -268,9 +268,9 @@ CaseFile readCaseFile(const fs::path& file) try {
   const Json j = parsed(file);
   if (const auto schema = j.find("schema"); schema == j.end() || *schema != kSchema)
     throw UsageError(fmt::format("its \"schema\" is not {}, the only one known", kSchema));
-  requireKeys(j, {"schema", "case", "kernel", "seed", "device", "output", "field", "judgement",
-                  "input"},
-              "the file");
+  requireKeys(
+      j, {"schema", "case", "kernel", "seed", "device", "output", "field", "judgement", "input"},
+      "the file");
   CaseFile f{.name = textAt(j, "case"),
              .kernel = textAt(j, "kernel"),
              .seed = countAt(j, "seed", "the file"),

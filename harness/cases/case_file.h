@@ -9,13 +9,13 @@
 namespace gnomon {
 
 struct CaseFile {
-  std::string name{};        ///< of the case
-  std::string kernel{};      ///< "brdf/evaluate"
-  std::uint64_t seed = 0;    ///< of the run that found it
-  std::string device{};      ///< that it was found on, for a reader
-  std::string output{};      ///< that failed, likewise
-  std::string field{};       ///< of it; empty for a finding of hygiene
-  std::size_t judgement = 0; ///< which of the inputs that the case judges it replaces, from 0
+  std::string name{};         ///< of the case
+  std::string kernel{};       ///< "brdf/evaluate"
+  std::uint64_t seed = 0;     ///< of the run that found it
+  std::string device{};       ///< that it was found on, for a reader
+  std::string output{};       ///< that failed, likewise
+  std::string field{};        ///< of it; empty for a finding of hygiene
+  std::size_t judgement = 0;  ///< which of the inputs that the case judges it replaces, from 0
   CaseInput input{};
 };
 

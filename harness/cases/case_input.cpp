@@ -106,8 +106,7 @@ std::string scalarInWords(ScalarType type, std::uint32_t word) {
 std::string fieldInWords(const Field& f, std::span<const std::byte> element) {
   std::string text;
   for (unsigned s = 0; s < f.scalars; ++s)
-    text += (s > 0 ? ", " : "") +
-            scalarInWords(f.scalar, wordAt(element, f.offset + s * kWord));
+    text += (s > 0 ? ", " : "") + scalarInWords(f.scalar, wordAt(element, f.offset + s * kWord));
   return f.scalars > 1 ? "(" + text + ")" : text;
 }
 

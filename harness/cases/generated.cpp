@@ -101,15 +101,16 @@ class Retrial {
     const std::size_t size = subject.record.layoutOf(trial.expected.output).size;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const Observation one = elementSeen(trial.seen, trial.expected.output, size, i);
-      if (failsBy(failure, judged(trial, one, elementExpected(trial.expected, i)), one, subject.standard))
+      if (failsBy(failure, judged(trial, one, elementExpected(trial.expected, i)), one,
+                  subject.standard))
         return i;
     }
     return std::nullopt;
   }
 
   Verdict judged(const Trial& trial, const Observation& seen, const Expectation& e) const {
-    return judge(subject.record.layoutOf(trial.expected.output), seen, e, subject.standard.bounds, policy,
-                 caseSeed());
+    return judge(subject.record.layoutOf(trial.expected.output), seen, e, subject.standard.bounds,
+                 policy, caseSeed());
   }
 
   Generated& generated;
@@ -140,8 +141,7 @@ std::string whatItDoes(const Failure& f) {
 }
 
 std::string story(const Shrunk& s, const Failure& f) {
-  const std::string tried =
-      fmt::format("{} input{} tried", s.trials, s.trials == 1 ? "" : "s");
+  const std::string tried = fmt::format("{} input{} tried", s.trials, s.trials == 1 ? "" : "s");
   if (s.steps == 0)
     return fmt::format("No simpler input {} was found ({}) than:\n", whatItDoes(f), tried);
   return fmt::format("Shrunk in {} step{} ({}) to {} {}:\n", s.steps, s.steps == 1 ? "" : "s",
@@ -208,9 +208,8 @@ std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& tr
       .fitted = [&](const CaseInput& c) { return retrial.fitted(c); },
       .firstFailing = [&](auto candidates) { return retrial.firstFailing(candidates); },
       .atOnce = [&](const CaseInput& c) { return retrial.atOnce(c); }};
-  const ShrinkLimits limits{
-      .time = std::chrono::duration<double>(policy["shrinkSeconds"]),
-      .trials = static_cast<std::size_t>(policy["shrinkTrials"])};
+  const ShrinkLimits limits{.time = std::chrono::duration<double>(policy["shrinkSeconds"]),
+                            .trials = static_cast<std::size_t>(policy["shrinkTrials"])};
   Shrunk shrunk = shrink(original, trials, limits);
   std::optional<Verdict> alone;
   try {

@@ -127,17 +127,17 @@ void KernelCase::judgeGenerated(Generated& generated) {
   const Standard by = standard();
   expectWithin(by, session.policy(), trial.seen, trial.expected,
                [&](const Verdict& verdict, const Expectation& expected) {
-    const std::string asItWas = explain(verdict, expected);
-    // The first failure of a case says most: one is enough to shrink.
-    CaseRecord& found = session.currentCase();
-    if (!session.options().shrinks || !found.messages.empty()) return asItWas;
-    const auto shrunk =
-        shrinkFailure(generated, trial, verdict,
-                      {.record = contract, .standard = by, .judgement = judgement});
-    if (!shrunk) return asItWas;
-    found.shrunk = shrunk->file;
-    return explainFields(verdict) + shrunk->text;
-  });
+                 const std::string asItWas = explain(verdict, expected);
+                 // The first failure of a case says most: one is enough to shrink.
+                 CaseRecord& found = session.currentCase();
+                 if (!session.options().shrinks || !found.messages.empty()) return asItWas;
+                 const auto shrunk =
+                     shrinkFailure(generated, trial, verdict,
+                                   {.record = contract, .standard = by, .judgement = judgement});
+                 if (!shrunk) return asItWas;
+                 found.shrunk = shrunk->file;
+                 return explainFields(verdict) + shrunk->text;
+               });
 }
 
 void KernelCase::replay(Generated& generated, std::size_t judgement) {

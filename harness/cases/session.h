@@ -26,10 +26,10 @@ struct SessionOptions {
   std::optional<std::size_t> cases{};  ///< generated inputs a case, instead of the policy's number
   std::optional<std::chrono::seconds> timeout{};  ///< a case, instead of the policy's number
   std::map<std::string, std::filesystem::path> kernels{};  ///< replaced: "stage/entry" -> file
-  bool shrinks = true;              ///< failing generated inputs, before they are shown
+  bool shrinks = true;               ///< failing generated inputs, before they are shown
   std::filesystem::path failures{};  ///< folder that they are written to; empty: nowhere
   std::filesystem::path replay{};    ///< such a file: its input alone, in place of the case's own
-  bool validation = true;  ///< Vulkan's validation layer; off for timing only
+  bool validation = true;            ///< Vulkan's validation layer; off for timing only
 };
 
 /// The longest time that a case may take.

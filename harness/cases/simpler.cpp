@@ -63,8 +63,8 @@ std::uint64_t cost(float x) {
   if (x == -1) return 4;
   const Decimal d(x);
   return 8 + static_cast<std::uint64_t>(d.digits) * kPerDigit +
-         static_cast<std::uint64_t>(std::abs(d.exponent)) * kPerExponent +
-         (x < 0 ? kNegative : 0) + d.mantissa;
+         static_cast<std::uint64_t>(std::abs(d.exponent)) * kPerExponent + (x < 0 ? kNegative : 0) +
+         d.mantissa;
 }
 
 template <class T>
@@ -251,6 +251,7 @@ Candidates fewerElements(const Shared& input, std::size_t b) {
   for (const std::size_t k : smallerCounts(n, 1)) {
     add(0, k);
     if (focus >= k) add(std::min(focus - k / 2, n - k), k);
+    add(n - k, k);
   }
   return found;
 }
@@ -274,19 +275,21 @@ uvec2 extentOf(const CaseInput& input) {
   return {0, 0};
 }
 
-CaseInput withExtent(const CaseInput& input, const uvec2& size) {
+/// Around the focus, or where that says nothing, the part that ends at the end.
+CaseInput withExtent(const CaseInput& input, const uvec2& size, bool around = true) {
   CaseInput smaller = input;
   const uvec2 whole = extentOf(input), focus = glm::min(input.focus, whole - 1u);
-  const uvec2 at = cornerFor(focus, size, whole);
+  const uvec2 at = around ? cornerFor(focus, size, whole) : whole - size;
   for (CaseInput::Image& i : smaller.images)
     if (i.ofExtent) i.picture = cropped(i.picture, at, size);
-  smaller.focus = focus - at;
+  smaller.focus = focus - glm::min(focus, at);
   return smaller;
 }
 
 /// Of the others, the texel next to the focus.
 CaseInput withoutSurroundings(const CaseInput& input) {
-  const uvec2 whole = glm::max(extentOf(input), uvec2(1)), focus = glm::min(input.focus, whole - 1u);
+  const uvec2 whole = glm::max(extentOf(input), uvec2(1)),
+              focus = glm::min(input.focus, whole - 1u);
   CaseInput smaller = input;
   for (CaseInput::Image& i : smaller.images)
     if (!i.ofExtent) i.picture = cropped(i.picture, focus * i.picture.size / whole, {1, 1});
@@ -308,7 +311,9 @@ Candidates smallerImages(const Shared& input) {
     const std::vector<uvec2> sizes = smallerSizes(extent);
     for (const uvec2& size : sizes)
       found.emplace_back([=] { return withoutSurroundings(withExtent(*input, size)); });
-    for (const uvec2& size : sizes) found.emplace_back([=] { return withExtent(*input, size); });
+    for (const bool around : {true, false})
+      for (const uvec2& size : sizes)
+        found.emplace_back([=] { return withExtent(*input, size, around); });
   }
   found.emplace_back([=] { return withoutSurroundings(*input); });
   for (std::size_t i = 0; i < input->images.size(); ++i) {
@@ -356,12 +361,11 @@ void putElement(CaseInput& input, std::size_t b, std::size_t e, const Bytes& byt
 
 Site fieldOfElement(std::size_t b, std::size_t e, const CaseInput::Block& block, const Field& f,
                     bool direction) {
-  return {fmt::format("{}[{}].{}", block.name, e, f.name),
-          [b, e, f, direction](const Shared& input) {
-            return withEach(
-                input, simplerElements(input->buffers[b].element(e), f, direction),
-                [b, e](CaseInput& i, const Bytes& bytes) { putElement(i, b, e, bytes); });
-          }};
+  return {
+      fmt::format("{}[{}].{}", block.name, e, f.name), [b, e, f, direction](const Shared& input) {
+        return withEach(input, simplerElements(input->buffers[b].element(e), f, direction),
+                        [b, e](CaseInput& i, const Bytes& bytes) { putElement(i, b, e, bytes); });
+      }};
 }
 
 /// Turned so that one direction is the z axis and another lies in the plane of x and z: angles
@@ -393,9 +397,9 @@ Site frameOf(std::size_t b, std::size_t e, const std::vector<Field>& directions)
               for (std::size_t side = 0; side < directions.size(); ++side)
                 if (side != up || directions.size() == 1)
                   elements.push_back(turned(input->buffers[b].element(e), directions, up, side));
-            return withEach(
-                input, elements,
-                [b, e](CaseInput& i, const Bytes& bytes) { putElement(i, b, e, bytes); });
+            return withEach(input, elements, [b, e](CaseInput& i, const Bytes& bytes) {
+              putElement(i, b, e, bytes);
+            });
           }};
 }
 
@@ -522,7 +526,8 @@ Complexity Simplifier::complexity(const CaseInput& input) const {
   if (c.numbers > kCounted) return c;
   for (const CaseInput::Block& b : input.buffers) c.digits += digits(b);
   for (const CaseInput::Image& i : input.images)
-    for (const vec4& t : i.picture.texels) c.digits += cost(t.x) + cost(t.y) + cost(t.z) + cost(t.w);
+    for (const vec4& t : i.picture.texels)
+      c.digits += cost(t.x) + cost(t.y) + cost(t.z) + cost(t.w);
   return c;
 }
 

@@ -93,9 +93,8 @@ nlohmann::json failuresOf(const KernelSummary& k, const SessionOptions& options)
   for (const CaseRecord* r : k.records) {
     if (r->waived) continue;
     for (const std::string& message : r->messages)
-      list.push_back({{"case", r->name},
-                      {"reproduce", reproduceCommand(*r, options)},
-                      {"message", message}});
+      list.push_back(
+          {{"case", r->name}, {"reproduce", reproduceCommand(*r, options)}, {"message", message}});
   }
   return list;
 }

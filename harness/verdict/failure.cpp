@@ -24,8 +24,8 @@ std::string withoutNumbers(std::string_view finding) {
 }
 
 bool hasFinding(const Observation& seen, const std::string& finding) {
-  return std::ranges::any_of(
-      seen.findings, [&](const std::string& f) { return withoutNumbers(f) == finding; });
+  return std::ranges::any_of(seen.findings,
+                             [&](const std::string& f) { return withoutNumbers(f) == finding; });
 }
 
 const FieldVerdict* fieldOf(const Verdict& v, const std::string& name) {

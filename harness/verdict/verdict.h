@@ -80,8 +80,8 @@ struct Verdict {
   /// thousands showed that the kernel is wrong at large.
   std::size_t bounded = 0;
   bool rearranged = false;  ///< the twin is inside, the module as it is further than it may be
-  bool truncated = false;         ///< wrong at large, so the rest was left alone
-  std::size_t outside = 0;        ///< elements of the twin outside the specification's bound
+  bool truncated = false;   ///< wrong at large, so the rest was left alone
+  std::size_t outside = 0;  ///< elements of the twin outside the specification's bound
   std::size_t outsideDevice = 0;  ///< outside the device's bound
   std::size_t ambiguous = 0;      ///< elements with a joined branch, of the `bounded` ones
   std::size_t reassociated = 0;   ///< elements of the plain module outside the bound

@@ -144,7 +144,7 @@ void main() {}
       "validate --filter '*LobeStays*' --cases 64 --kernel brdf/evaluate=" + kernel.string());
   EXPECT_EQ(said.status, 1) << said.output;
   EXPECT_NE(said.output.find("unwritten"), std::string::npos) << said.output;
-  EXPECT_NE(said.output.find("reproduce: ./gnomon validate --filter"), std::string::npos);
+  EXPECT_NE(said.output.find("reproduce: ./gnomon validate --replay"), std::string::npos);
 }
 
 }  // namespace

@@ -26,10 +26,11 @@ fs::path broken(const Scratch& scratch, const std::string& kernel, const std::st
   return copy / (kernel + ".comp");
 }
 
-/// From the numbers of the failing element to the end of the message.
+/// What was got, what was allowed and the model's value.
 std::string numbersIn(const std::string& output) {
-  const std::size_t got = output.find("  got  ");
-  return got == std::string::npos ? "" : output.substr(got, output.find("reproduce:") - got);
+  const std::size_t got = output.find("  got  "), model = output.find("  model  ", got);
+  if (got == std::string::npos || model == std::string::npos) return "";
+  return output.substr(got, output.find('\n', model) - got);
 }
 
 struct Found {
@@ -47,8 +48,9 @@ Found shrunk(const Scratch& scratch, const std::string& kernel, const fs::path& 
 
 void expectReplays(const Found& found, const std::string& kernel, const fs::path& wrong) {
   ASSERT_EQ(found.said.status, 1) << found.said.output;
-  const std::string command = fmt::format("reproduce: ./gnomon validate --replay '{}' --kernel '{}={}'",
-                                          found.file.string(), kernel, wrong.string());
+  const std::string command =
+      fmt::format("reproduce: ./gnomon validate --replay '{}' --kernel '{}={}'",
+                  found.file.string(), kernel, wrong.string());
   EXPECT_NE(found.said.output.find(command), std::string::npos) << found.said.output;
   const Said again = gnomonSays(fmt::format("validate --replay {} --kernel {}={}",
                                             found.file.string(), kernel, wrong.string()));
@@ -78,8 +80,8 @@ TEST(Replay, AWrongPiShowsOnOneSampleOfAxesAndComesBack) {
 // The fault lies between the two thresholds, so the shortest number there is 0.004.
 TEST(Replay, AWrongThresholdShowsOnOnePixelBetweenTheTwo) {
   const Scratch scratch;
-  const fs::path wrong = broken(scratch, "tonemap/resolve", "lib/tonemap.glsl", "x <= 0.0031308",
-                                "x <= 0.0041308");
+  const fs::path wrong =
+      broken(scratch, "tonemap/resolve", "lib/tonemap.glsl", "x <= 0.0031308", "x <= 0.0041308");
   const Found found =
       shrunk(scratch, "tonemap/resolve", wrong, "TonemapResolve.ShadowsStayInsideTheBound");
   expectReplays(found, "tonemap/resolve", wrong);
@@ -90,9 +92,10 @@ TEST(Replay, AWrongThresholdShowsOnOnePixelBetweenTheTwo) {
 
 TEST(Replay, WhatIsLeftUnwrittenShowsOnOnePixel) {
   const Scratch scratch;
-  const fs::path wrong = broken(scratch, "post/views", "post/views.comp",
-                                "greaterThanEqual(", "greaterThan(uvec2(1), uvec2(0))) || any(greaterThanEqual(");
-  const Found found = shrunk(scratch, "post/views", wrong, "PostViews.EveryModeStaysInsideTheBound");
+  const fs::path wrong = broken(scratch, "post/views", "post/views.comp", "greaterThanEqual(",
+                                "greaterThan(uvec2(1), uvec2(0))) || any(greaterThanEqual(");
+  const Found found =
+      shrunk(scratch, "post/views", wrong, "PostViews.EveryModeStaysInsideTheBound");
   ASSERT_EQ(found.said.status, 1) << found.said.output;
   EXPECT_NE(found.said.output.find("'albedo' of 1 x 1"), std::string::npos) << found.said.output;
   EXPECT_EQ(gnomonSays(fmt::format("validate --replay {} --kernel post/views={}",
@@ -117,7 +120,8 @@ TEST(Replay, FilesThatAreNoneAreRefused) {
                           name, kernel, judgement, input))
         .string();
   };
-  const std::string lobe = "BrdfEvaluate.LobeStaysInsideTheBound", none = R"({"buffers": {"samples": []}})";
+  const std::string lobe = "BrdfEvaluate.LobeStaysInsideTheBound",
+                    none = R"({"buffers": {"samples": []}})";
   ASSERT_EQ(gnomonSays("validate --replay " + file(lobe, "brdf/evaluate", 0, none)).status, 0);
   refused("/no/such/file.json", "/no/such/file.json");
   refused(scratch.file("junk.json", "junk").string(), "junk.json");

@@ -47,14 +47,13 @@ ImageSpec imageCalled(const char* name, unsigned binding) {
 }
 
 // A kernel for files to be of; nothing runs it.
-const KernelRecord kRecord = {
-    .stage = "shrinktest",
-    .entry = "kernel",
-    .file = "",
-    .buffers = {{"items", 0, Access::kRead, itemLayout()}},
-    .images = {imageCalled("whole", 1), imageCalled("part", 2)},
-    .push = describe<Settings>("Settings", field("size", &Settings::size),
-                               field("scale", &Settings::scale))};
+const KernelRecord kRecord = {.stage = "shrinktest",
+                              .entry = "kernel",
+                              .file = "",
+                              .buffers = {{"items", 0, Access::kRead, itemLayout()}},
+                              .images = {imageCalled("whole", 1), imageCalled("part", 2)},
+                              .push = describe<Settings>("Settings", field("size", &Settings::size),
+                                                         field("scale", &Settings::scale))};
 const bool registered = registerKernel(kRecord);
 
 CaseInput itemsOf(const std::vector<Item>& items) {
@@ -88,8 +87,7 @@ constexpr ShrinkLimits kAmple{.time = std::chrono::minutes(1), .trials = 100'000
 template <class Fails>
 Trials trialsOf(const Fails& fails) {
   return {.fitted = [](const CaseInput& c) { return std::optional(c); },
-          .firstFailing =
-              [fails](std::span<const CaseInput> all) -> std::optional<std::size_t> {
+          .firstFailing = [fails](std::span<const CaseInput> all) -> std::optional<std::size_t> {
             for (std::size_t i = 0; i < all.size(); ++i)
               if (fails(all[i])) return i;
             return std::nullopt;
@@ -99,9 +97,7 @@ Trials trialsOf(const Fails& fails) {
 
 template <class Fails>
 auto anyItem(const Fails& fails) {
-  return trialsOf([fails](const CaseInput& c) {
-    return std::ranges::any_of(itemsIn(c), fails);
-  });
+  return trialsOf([fails](const CaseInput& c) { return std::ranges::any_of(itemsIn(c), fails); });
 }
 
 TEST(Shrink, APlantedFaultComesDownToItsKnownMinimum) {
@@ -119,12 +115,12 @@ TEST(Shrink, APlantedFaultComesDownToItsKnownMinimum) {
 }
 
 TEST(Shrink, AFaultOfTwoFieldsKeepsBoth) {
-  const Shrunk s = shrink(
-      itemsOf(generatedItems(1000)),
-      anyItem([](const Item& i) { return i.mode >= 42 && i.colour.y > 0.3f; }), kAmple);
+  const Shrunk s =
+      shrink(itemsOf(generatedItems(1000)),
+             anyItem([](const Item& i) { return i.mode >= 42 && i.colour.y > 0.3f; }), kAmple);
   const std::vector<Item> items = itemsIn(s.input);
   ASSERT_EQ(items.size(), 1u);
-  EXPECT_EQ(items[0].mode, 42u);  // the smallest that fails
+  EXPECT_EQ(items[0].mode, 42u);              // the smallest that fails
   EXPECT_EQ(items[0].colour, vec3(0, 1, 0));  // 1 is simpler than any other number above 0.3
 }
 
@@ -206,16 +202,16 @@ TEST(Shrink, AnImageComesDownToThePixelThatFails) {
     for (uint t = 0; t < i.picture.size.x * i.picture.size.y; ++t)
       i.picture.texels.emplace_back(random.uniform(), random.uniform(), 0.5, 1);
   input.images[0].picture.texels[5 * 37 + 30].x = 7.5f;
-  const Shrunk s = shrink(
-      input,
-      {.fitted = [](const CaseInput& c) { return std::optional(c); },
-       .firstFailing = [](std::span<const CaseInput> all) -> std::optional<std::size_t> {
-         const bool fails = std::ranges::any_of(all[0].images[0].picture.texels,
-                                                [](const vec4& t) { return t.x > 3; });
-         return fails ? std::optional<std::size_t>(0) : std::nullopt;
-       },
-       .atOnce = [](const CaseInput&) { return false; }},
-      kAmple);
+  const Shrunk s =
+      shrink(input,
+             {.fitted = [](const CaseInput& c) { return std::optional(c); },
+              .firstFailing = [](std::span<const CaseInput> all) -> std::optional<std::size_t> {
+                const bool fails = std::ranges::any_of(all[0].images[0].picture.texels,
+                                                       [](const vec4& t) { return t.x > 3; });
+                return fails ? std::optional<std::size_t>(0) : std::nullopt;
+              },
+              .atOnce = [](const CaseInput&) { return false; }},
+             kAmple);
   EXPECT_EQ(s.input.images[0].picture.size, uvec2(1));
   EXPECT_EQ(s.input.images[1].picture.size, uvec2(1));
   EXPECT_EQ(s.input.images[0].picture.at(0), vec4(4, 0, 0, 0));  // the smallest digit above 3
@@ -328,7 +324,7 @@ TEST_F(CaseFiles, WhatIsNoInputIsRefusedWithTheFileAndTheReason) {
       {edited("\"size\": [2, 1]", "\"size\": [2, -1]"), "size"},
       {edited("\"size\": [2, 1], \"ofExtent\"", "\"size\": [4294967295, 4294967295], \"ofExtent\""),
        "texels"},
-      {edited("\"items\"", "\"thing\""), "thing"},
+      {edited("\"items\": [", "\"thing\": ["), "thing"},
       {edited("\"whole\"", "\"hole\""), "hole"}};
   for (const auto& [text, reason] : broken) {
     const auto file = with(text);
