@@ -460,8 +460,8 @@ std::vector<std::uint32_t> simplerThan(std::uint32_t x) {
 }
 
 bool isUnit(const vec3& v) {
-  // Each component is rounded by at most 2^-25 relatively, so the square of the length by 2^-23 at
-  // most with the second order; a normalisation in float may leave three such roundings.
+  // Each component is rounded by at most 2^-24 relatively, so the square of the length by 2^-23; a
+  // normalisation in float may leave four such roundings.
   constexpr double kRoundings = 0x1p-21;
   return std::abs(glm::dot(glm::dvec3(v), glm::dvec3(v)) - 1) <= kRoundings;
 }
