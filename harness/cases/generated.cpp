@@ -6,6 +6,7 @@
 
 #include "harness/cases/case_file.h"
 #include "harness/cases/kernel_case.h"
+#include "harness/cases/probes.h"
 #include "harness/cases/shrink.h"
 
 namespace gnomon {
@@ -167,6 +168,16 @@ std::optional<std::string> written(const CaseInput& input, const Failure& f,
   return done ? std::optional(file.string()) : std::nullopt;
 }
 
+/// The first intermediate that is wrong with the input as it is now.
+std::string intermediates(Generated& generated, const Verdict& verdict, const Subjected& subject) {
+  const Trial trial = generated.run();
+  for (const Expectation& e : judgedBy(subject.record, trial.expected))
+    if (e.output == verdict.output)
+      return firstDivergence(subject.record.name(), trial.seen, e, subject.standard.bounds,
+                             verdict);
+  return {};
+}
+
 }  // namespace
 
 std::vector<Expectation> judgedBy(const KernelRecord& record, const Expectation& expected) {
@@ -180,15 +191,15 @@ std::vector<Expectation> judgedBy(const KernelRecord& record, const Expectation&
   return all;
 }
 
-std::string explainInput(Generated& generated, const Verdict& verdict, const KernelRecord& record) {
-  const CaseInput input = generated.gathered(record);
+std::string explainInput(Generated& generated, const Verdict& verdict, const Subjected& subject) {
+  const CaseInput input = generated.gathered(subject.record);
   std::string text = fmt::format("  {}\n", sizeInWords(input)) + inWords(input);
   for (const std::string& p : verdict.problems) text += "  - " + p + "\n";
   // What was not written, or written twice, has no numbers of its own.
   const Offender* worst = worstOf(verdict);
   if (worst != nullptr && (verdict.problems.empty() || verdict.rearranged))
     text += fmt::format("  {}.{}\n", verdict.output, worst->field) + explainNumbers(*worst);
-  return text;
+  return text + intermediates(generated, verdict, subject);
 }
 
 std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& trial,
@@ -223,7 +234,7 @@ std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& tr
   }
   if (!alone) return std::nullopt;
   return ShrunkFailure{
-      .text = story(shrunk, *failure) + explainInput(generated, *alone, subject.record),
+      .text = story(shrunk, *failure) + explainInput(generated, *alone, subject),
       .file = written(shrunk.input, *failure, subject)};
 }
 

@@ -85,7 +85,7 @@ struct Subjected {
 std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& trial,
                                            const Verdict& verdict, const Subjected& subject);
 
-/// The input that fails with its numbers, as it is shown.
-std::string explainInput(Generated& generated, const Verdict& verdict, const KernelRecord& record);
+/// The input that fails with its numbers, as it is shown, and the first intermediate that is wrong.
+std::string explainInput(Generated& generated, const Verdict& verdict, const Subjected& subject);
 
 }  // namespace gnomon

@@ -8,6 +8,7 @@
 
 #include "harness/cases/case_file.h"
 #include "harness/cases/hash.h"
+#include "harness/cases/probes.h"
 #include "harness/error.h"
 #include "harness/hygiene/pack.h"
 
@@ -73,7 +74,11 @@ Observation KernelCase::run(Stimulus stimulus) {
   if (!applies(stimulus.push)) return {.applies = false};
   ++runs;
   stimulus.limit = session.limit();
-  return observe(session.subject(kernelName), stimulus, session.watch());
+  const Subject& subject = session.subject(kernelName);
+  Observation seen = observe(subject, stimulus, session.watch());
+  if (session.options().probes && !subject.record().probes.fields.empty())
+    seen.stimulus = std::make_shared<const KeptStimulus>(stimulus);
+  return seen;
 }
 
 void KernelCase::expectClean(const Observation& seen) {
@@ -81,14 +86,27 @@ void KernelCase::expectClean(const Observation& seen) {
 }
 
 void KernelCase::expectConforms(const Observation& seen, const Expectation& expected) {
-  if (Session::current().options().replay.empty())
-    expectWithin(standard(), Session::current().policy(), seen, expected, explain);
+  if (Session::current().options().replay.empty()) expectWithin(standard(), seen, expected);
 }
 
 void KernelCase::expectWithinSpecification(const Observation& seen, const Expectation& expected) {
   Standard specification = standard();
   specification.bounds.device.reset();
-  expectWithin(specification, Session::current().policy(), seen, expected, explain);
+  expectWithin(specification, seen, expected);
+}
+
+void KernelCase::expectWithin(const Standard& by, const Observation& seen,
+                              const Expectation& expected) {
+  expectWithin(by, Session::current().policy(), seen, expected,
+               [&](const Verdict& verdict, const Expectation& e) {
+                 return explainProbed(by, seen, verdict, e);
+               });
+}
+
+std::string KernelCase::explainProbed(const Standard& by, const Observation& seen,
+                                      const Verdict& verdict, const Expectation& expected) const {
+  return explain(verdict, expected,
+                 firstDivergence(kernelName, seen, expected, by.bounds, verdict));
 }
 
 // Another arrangement of a user's is as good as ours; ours has to be the model's own, and as exact
@@ -127,14 +145,16 @@ void KernelCase::judgeGenerated(Generated& generated) {
   const Standard by = standard();
   expectWithin(by, session.policy(), trial.seen, trial.expected,
                [&](const Verdict& verdict, const Expectation& expected) {
-                 const std::string asItWas = explain(verdict, expected);
                  // The first failure of a case says most: one is enough to shrink.
                  CaseRecord& found = session.currentCase();
-                 if (!session.options().shrinks || !found.messages.empty()) return asItWas;
+                 const auto asItWas = [&] {
+                   return explainProbed(by, trial.seen, verdict, expected);
+                 };
+                 if (!session.options().shrinks || !found.messages.empty()) return asItWas();
                  const auto shrunk =
                      shrinkFailure(generated, trial, verdict,
                                    {.record = contract, .standard = by, .judgement = judgement});
-                 if (!shrunk) return asItWas;
+                 if (!shrunk) return asItWas();
                  found.shrunk = shrunk->file;
                  return explainFields(verdict) + shrunk->text;
                });
@@ -152,10 +172,11 @@ void KernelCase::replay(Generated& generated, std::size_t judgement) {
   if (found.unusable) return;
   found.replayed = true;
   const Trial trial = generated.run();
-  expectWithin(standard(), forFewElements(session.policy()), trial.seen, trial.expected,
+  const Standard by = standard();
+  expectWithin(by, forFewElements(session.policy()), trial.seen, trial.expected,
                [&](const Verdict& verdict, const Expectation&) {
                  return explainFields(verdict) + "It was replayed with the input:\n" +
-                        explainInput(generated, verdict, contract);
+                        explainInput(generated, verdict, {.record = contract, .standard = by});
                });
 }
 

@@ -86,6 +86,10 @@ class KernelCase : public testing::Test {
   Standard standard() const;
   void judgeGenerated(Generated& generated);
   void replay(Generated& generated, std::size_t judgement);
+  void expectWithin(const Standard& standard, const Observation& seen, const Expectation& expected);
+  /// With the first intermediate that is wrong.
+  std::string explainProbed(const Standard& by, const Observation& seen, const Verdict& verdict,
+                            const Expectation& expected) const;
   void expectWithin(const Standard& standard, const Policy& policy, const Observation& seen,
                     const Expectation& expected, const Explain& explained);
   std::size_t runs = 0, left = 0;  // of run(), and where the kernel did not apply

@@ -41,6 +41,7 @@ Session& Session::current() {
 Gpu& Session::gpu() {
   if (device && !device->alive()) {  // a case lost it: the next one starts afresh
     subjects.clear();
+    probedKernels.clear();
     device.reset();
   }
   if (!device)
@@ -69,6 +70,19 @@ KernelModule Session::load(const KernelRecord& record) const {
 void Session::mutate(const std::string& kernel, SpirvWords module) {
   mutated[kernel] = std::move(module);
   subjects.erase(kernel);
+}
+
+const Subject* Session::probed(const std::string& kernel) {
+  const Subject& usual = subject(kernel);
+  std::unique_ptr<ProbedKernel>& slot = probedKernels[kernel];
+  if (!slot) {
+    const auto foreign = settings.kernels.find(kernel);
+    const std::filesystem::path kernels = settings.root / "kernels";
+    slot = std::make_unique<ProbedKernel>(
+        usual, foreign == settings.kernels.end() ? kernels / usual.record().file : foreign->second,
+        kernels);
+  }
+  return slot->subject();
 }
 
 std::uint64_t Session::foreignHash(const std::string& kernel) const {

@@ -13,6 +13,7 @@
 
 #include "harness/cases/device_rules.h"
 #include "harness/hygiene/observe.h"
+#include "harness/hygiene/probed.h"
 #include "harness/hygiene/subject.h"
 #include "harness/verdict/policy.h"
 #include "harness/verdict/verdict.h"
@@ -30,6 +31,7 @@ struct SessionOptions {
   std::filesystem::path failures{};  ///< folder that they are written to; empty: nowhere
   std::filesystem::path replay{};    ///< such a file: its input alone, in place of the case's own
   bool validation = true;            ///< Vulkan's validation layer; off for timing only
+  bool probes = true;                ///< a failure names the first intermediate that is wrong
 };
 
 /// The longest time that a case may take.
@@ -81,6 +83,9 @@ class Session {
   /// How much of every run is watched from now on.
   void watchOnly(Watch watch) { watched = watch; }
   Watch watch() const { return watched; }
+  /// The same kernel with its probes on, compiled at first use; null where it names none. Throws as
+  /// subject() does.
+  const Subject* probed(const std::string& kernel);
 
   /// Changes with what a kernel of the user's comes to, by its file or what that includes.
   std::uint64_t foreignHash(const std::string& kernel) const;
@@ -124,6 +129,7 @@ class Session {
   std::map<std::string, std::unique_ptr<Subject>> subjects;
   std::map<std::string, SpirvWords> mutated;
   Watch watched = Watch::kAll;
+  std::map<std::string, std::unique_ptr<ProbedKernel>> probedKernels;
   std::vector<CaseRecord> records;
 };
 

@@ -152,10 +152,13 @@ Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watc
   return seen;
 }
 
-std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus) {
+std::uint32_t poisonOf(unsigned run) { return kPoison[run]; }
+
+std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus,
+                                         unsigned poison) {
   Resources resources(subject, stimulus, Target::kFloat);
   resources.upload();
-  Aftermath after = resources.run(subject.twin(), kPoison[0]);
+  Aftermath after = resources.run(subject.twin(), kPoison[poison]);
   std::map<std::string, Bytes> outputs;
   for (std::size_t o = 0; o < after.outputs.size(); ++o)
     outputs.try_emplace(resources.outputs()[o].name, std::move(after.outputs[o]));

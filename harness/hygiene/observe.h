@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@ struct Observation {
   std::map<std::string, Bytes> twin{};   ///< outputs of its strict twin
   std::set<std::string> unmapped{};      ///< "results.F": outputs that the module does not give; 0
   std::vector<std::string> findings{};   ///< hygiene: one sentence each; empty if clean
+  /// What ran, where it may have to run again with probes; else null.
+  std::shared_ptr<const KeptStimulus> stimulus{};
 };
 
 /// How much is watched.
@@ -43,7 +46,11 @@ Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watc
 
 /// Outputs of one run of the strict twin, without any of these checks: for measuring over inputs so
 /// many that checking each would take hours. What is measured so has to be observed on a part
-/// first.
-std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus);
+/// first. `poison` is the run whose pattern fills the outputs: the first or the second.
+std::map<std::string, Bytes> runTwinOnce(const Subject& subject, const Stimulus& stimulus,
+                                         unsigned poison = 0);
+
+/// The word that an output buffer is filled with before that run.
+std::uint32_t poisonOf(unsigned run);
 
 }  // namespace gnomon

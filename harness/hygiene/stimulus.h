@@ -48,4 +48,19 @@ struct Stimulus {
   std::chrono::milliseconds limit{60'000};
 };
 
+/// A stimulus with bytes of its own, which may outlive whoever made it.
+class KeptStimulus {
+ public:
+  explicit KeptStimulus(const Stimulus& given);
+  KeptStimulus(const KeptStimulus&) = delete;
+  KeptStimulus& operator=(const KeptStimulus&) = delete;
+  const Stimulus& get() const { return stimulus; }
+
+ private:
+  std::span<const std::byte> keep(std::span<const std::byte> bytes);
+
+  Stimulus stimulus;
+  std::vector<std::vector<std::byte>> kept{};
+};
+
 }  // namespace gnomon

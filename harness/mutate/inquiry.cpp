@@ -125,7 +125,7 @@ class Inquiry {
     const std::vector<Witness> witnesses = witnessesOf(schedule, question.kernel);
     SessionOptions session = schedule.session;
     if (!session.timeout) session.timeout = patience(witnesses);
-    session.shrinks = false;  // that it fails is all that is asked
+    session.shrinks = session.probes = false;  // that it fails is all that is asked
     judgeMutants({session, schedule.policy, schedule.jobs, schedule.errors}, prepared.gpu,
                  question.kernel, open, witnesses, question.sought,
                  {.begun = [this](const Mutant& m) { tell(m.id); },

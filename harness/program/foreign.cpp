@@ -145,12 +145,14 @@ void refuseOtherEntries(const KernelModule& module, bool hlsl) {
 
 }  // namespace
 
-KernelModule loadKernel(const fs::path& file, const KernelRecord& record, const fs::path& kernels) {
+KernelModule loadKernel(const fs::path& file, const KernelRecord& record, const fs::path& kernels,
+                        const std::map<std::string, std::string>& defines) {
   KernelModule module{.origin = file.string()};
   const std::string ending = file.extension().string();
   bool isHlsl = ending == ".hlsl";
   if (ending == ".json") {
     module.adapter = readAdapter(file);
+    for (const auto& [name, value] : defines) module.adapter->defines[name] = value;
     isHlsl = module.adapter->functions.empty() && languageOf(*module.adapter) == "hlsl";
     module.words = compileAdapted(*module.adapter, record, kernels);
     module.entryPoint = module.adapter->entry;
@@ -158,6 +160,7 @@ KernelModule loadKernel(const fs::path& file, const KernelRecord& record, const 
     module.words = validSpirv(file);
   } else {
     CompileOptions options = compileOptions({}, record, kernels);
+    options.defines = defines;
     options.hlsl = isHlsl;
     if (isHlsl) options.stage = ".comp";
     module.words = compileShader(file, options);

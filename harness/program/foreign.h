@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -23,8 +24,9 @@ struct KernelModule {
 /// Loads a file for this entry: .comp (GLSL), .hlsl, .spv, or .json. Includes are looked for beside
 /// the file, in the adapter's folders, and in the stage's and all kernels' folders. Storage images
 /// lose their format qualifiers, so that their arithmetic can be judged in floats. Throws
-/// UsageError with file, cause and remedy.
+/// UsageError with file, cause and remedy. `defines` come on top of the adapter's.
 KernelModule loadKernel(const std::filesystem::path& file, const KernelRecord& record,
-                        const std::filesystem::path& kernels);
+                        const std::filesystem::path& kernels,
+                        const std::map<std::string, std::string>& defines = {});
 
 }  // namespace gnomon

@@ -32,6 +32,12 @@ Field typed(const char* type, ScalarType scalar, unsigned scalars) {
 
 }  // namespace
 
+std::string Field::scalarName(unsigned component) const {
+  if (scalars == 1) return name;
+  return scalars <= 4 ? fmt::format("{}.{}", name, "xyzw"[component])
+                      : fmt::format("{}[{}]", name, component);
+}
+
 unsigned Struct::scalars() const {
   unsigned n = 0;
   for (const Field& f : fields) n += f.scalars;

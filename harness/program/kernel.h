@@ -29,6 +29,9 @@ struct Field {
   unsigned scalars = 0;     ///< number of 32-bit scalars
   bool signOfZero = false;  ///< the contract fixes the sign of a zero
   std::string meaning{};    ///< what a convention may change: "roughness", "depth"
+
+  /// Of one of its scalars: "D", "F.y", "view[12]".
+  std::string scalarName(unsigned component) const;
 };
 
 /// A contract struct, described once so that reflection can be held against it.
@@ -147,6 +150,7 @@ struct KernelRecord {
   /// What a foreign kernel may express otherwise: convention -> values, ours first.
   std::map<std::string, std::vector<std::string>> conventions{};
   FunctionEntry functions{};
+  Struct probes{};  ///< intermediates that a kernel may name (kernels/lib/probe.glsl), in order
   std::string summary{};  ///< one line for `gnomon list kernels`
 
   std::string name() const { return stage + "/" + entry; }

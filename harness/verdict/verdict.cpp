@@ -30,10 +30,7 @@ std::vector<Scalar> scalarsOf(const Struct& layout) {
   for (std::size_t f = 0; f < layout.fields.size(); ++f) {
     const Field& field = layout.fields[f];
     for (unsigned c = 0; c < field.scalars; ++c) {
-      std::string suffix;
-      if (field.scalars > 1)
-        suffix = field.scalars <= 4 ? fmt::format(".{}", "xyzw"[c]) : fmt::format("[{}]", c);
-      all.push_back({field.name + suffix, f, field.offset + 4 * c, field.scalar, field.signOfZero});
+      all.push_back({field.scalarName(c), f, field.offset + 4 * c, field.scalar, field.signOfZero});
     }
   }
   return all;
@@ -478,13 +475,13 @@ Verdict judge(const Struct& layout, const Observation& seen, const Expectation& 
   return Judge(layout, seen, expected, bounds, policy, seed).run();
 }
 
-std::string explain(const Verdict& v, const Expectation& expected) {
+std::string explain(const Verdict& v, const Expectation& expected, const std::string& divergence) {
   if (v.ok() && v.outsideDevice == 0) return {};
   const Offender* worst = worstOf(v);
-  return explainFields(v) + (worst != nullptr ? worstElement(*worst, expected) : "");
+  return explainFields(v, divergence) + (worst != nullptr ? worstElement(*worst, expected) : "");
 }
 
-std::string explainFields(const Verdict& v) {
+std::string explainFields(const Verdict& v, const std::string& divergence) {
   std::string text;
   for (const std::string& p : v.problems) text += "- " + p + "\n";
   const std::size_t out = std::max(v.outside, v.outsideDevice);
@@ -497,6 +494,7 @@ std::string explainFields(const Verdict& v) {
     text += fieldTable(v);
     text += fmt::format("The first field that is wrong, in the order of the contract, is {}.\n",
                         first->name);
+    text += divergence;
   }
   return text;
 }

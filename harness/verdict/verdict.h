@@ -103,11 +103,13 @@ Verdict judge(const Struct& layout, const Observation& seen, const Expectation& 
 double budgetUsed(double got, const Bounded& allowed, bool signOfZero);
 
 /// A verdict in words for a person: what is wrong, which fields are not, the worst element with
-/// its inputs and what was allowed. Empty for a clean verdict.
-std::string explain(const Verdict& verdict, const Expectation& expected);
+/// its inputs and what was allowed. Empty for a clean verdict. `divergence` is what is known of the
+/// intermediates of worstOf(): lines that follow the name of the field.
+std::string explain(const Verdict& verdict, const Expectation& expected,
+                    const std::string& divergence = {});
 
 /// Its parts: what is wrong and which fields are not; and one scalar, got and allowed.
-std::string explainFields(const Verdict& verdict);
+std::string explainFields(const Verdict& verdict, const std::string& divergence = {});
 std::string explainNumbers(const Offender& offender);
 /// The scalar that a message is about: the worst of the first field outside. Null for none.
 const Offender* worstOf(const Verdict& verdict);

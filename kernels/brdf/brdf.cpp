@@ -21,6 +21,20 @@ Struct shaded() {
                           field("radiance", &Shaded::radiance));
 }
 
+Struct probes() {
+  return describe<EvaluateProbes>(
+      "EvaluateProbes", field("n", &EvaluateProbes::n), field("v", &EvaluateProbes::v),
+      field("l", &EvaluateProbes::l), field("halfway", &EvaluateProbes::halfway),
+      field("r", &EvaluateProbes::r), field("metallic", &EvaluateProbes::metallic),
+      field("albedo", &EvaluateProbes::albedo), field("irradiance", &EvaluateProbes::irradiance),
+      field("nxh", &EvaluateProbes::nxh), field("NoV", &EvaluateProbes::NoV),
+      field("NoL", &EvaluateProbes::NoL), field("VoH", &EvaluateProbes::VoH),
+      field("F0", &EvaluateProbes::F0), field("NoH", &EvaluateProbes::NoH),
+      field("D", &EvaluateProbes::D), field("G", &EvaluateProbes::G),
+      field("F", &EvaluateProbes::F), field("ambientF", &EvaluateProbes::ambientF),
+      field("denominator", &EvaluateProbes::denominator));
+}
+
 const bool registered = registerKernel({
     .order = 1,
     .stage = "brdf",
@@ -40,6 +54,7 @@ const bool registered = registerKernel({
                             {.name = "diffuse", .output = "results.diffuse"},
                             {.name = "specular", .output = "results.specular"},
                             {.name = "radiance", .output = "results.radiance"}}},
+    .probes = probes(),
     .summary = "Cook-Torrance D, G, F, lobes and shaded radiance for arrays of inputs",
 });
 

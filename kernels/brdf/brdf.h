@@ -32,6 +32,27 @@ struct Shaded {
   vec3 radiance;  // (diffuse + specular) NoL irradiance, W/(m^2 sr)
 };
 
+// What a kernel may name on its way, in the order of computation; ranges hold to a few roundings.
+struct EvaluateProbes {
+  vec3 n, v, l;     // unit vectors as they count, or zero
+  vec3 halfway;     // v + l, of any length
+  float r;          // perceptual roughness, [kMinRoughness, 1]
+  float metallic;   // [0, 1]
+  vec3 albedo;      // [0, 1]
+  vec3 irradiance;  // W/m^2, [0, kMaxIrradiance]
+  vec3 nxh;         // n x h of the unit half vector h
+  float NoV;        // [kMinNoV, 1]
+  float NoL;        // [0, 1]
+  float VoH;        // [0, 1]
+  vec3 F0;          // reflectance at normal incidence, [0, 1]
+  float NoH;        // [-1, 1]: not clamped, D is even in it
+  float D;          // from here on as in Shaded
+  float G;
+  vec3 F;
+  vec3 ambientF;
+  float denominator;  // of the specular lobe, [kMinDenominator, 4]
+};
+
 struct Evaluate {  // push constants
   uint count;      // samples; results beyond are not touched
 };

@@ -34,6 +34,11 @@ const bool registered = registerKernel({
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
     .deterministic = true,
     .conventions = {{"y", {"down", "up"}}, {"depth", {"reverse", "standard"}}},
+    .probes = describe<ViewsProbes>(
+        "ViewsProbes", field("depth", &ViewsProbes::depth, "depth"),
+        field("albedo", &ViewsProbes::albedo), field("distance", &ViewsProbes::distance),
+        field("cascade", &ViewsProbes::cascade), field("blendStart", &ViewsProbes::blendStart),
+        field("tinted", &ViewsProbes::tinted), field("shown", &ViewsProbes::shown)),
     .summary = "debug views: albedo, normal, depth, shadow cascades",
 });
 

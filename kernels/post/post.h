@@ -22,6 +22,17 @@ struct Views {  // push constants
   vec4 splits;  // view depth at which each cascade ends, ascending, the last one far
 };
 
+// What a kernel may name on its way, in the order of computation.
+struct ViewsProbes {
+  float depth;       // reverse-Z, as it counts, [0, 1]; 0 is sky, and then nothing else is reached
+  vec3 albedo;       // as it counts, [0, 1]
+  float distance;    // linear depth, near to far; of the views that need it
+  uint cascade;      // the distance's, 0 to 3
+  float blendStart;  // where that cascade's blend zone begins; not of the last
+  vec3 tinted;       // its colour over the dimmed scene
+  vec3 shown;        // the view, before it is clamped to [0, 1]
+};
+
 const uint kAlbedo = 0;  // 3 to 10 are left to views of other targets
 const uint kNormal = 1;
 const uint kDepth = 2;

@@ -5,6 +5,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_shader_image_load_formatted : require
 #include "tonemap.h"
+#include "../lib/probe.glsl"
 #include "../lib/safe.glsl"
 #include "../lib/tonemap.glsl"
 
@@ -13,6 +14,7 @@ layout(push_constant, scalar) uniform Push { Resolve push; };
 layout(set = 0, binding = kHdr) uniform texture2D hdr;
 layout(set = 0, binding = kBloom) uniform texture2D bloom;
 layout(set = 0, binding = kTarget) writeonly uniform image2D target;
+GNOMON_PROBE_BUFFER(ResolveProbes)
 
 #include "bloom_at.glsl"
 
@@ -42,12 +44,16 @@ float transfer(float x) {
 
 void main() {
   const uvec2 at = gl_GlobalInvocationID.xy;
+  GNOMON_PROBE_PIXEL(at, push.size);
   if (any(greaterThanEqual(at, push.size))) return;
   const ivec2 pixel = ivec2(at);
-  const vec3 scene =
-      safeScene(texelFetch(hdr, pixel, 0).rgb) + bloomAt(pixel) * push.bloomIntensity;
+  const vec3 scene = GNOMON_PROBED(hdr, safeScene(texelFetch(hdr, pixel, 0).rgb)) +
+                     GNOMON_PROBED(bloom, bloomAt(pixel)) * push.bloomIntensity;
   const vec3 exposed = clamp(scene * push.exposure, 0.0, kMaxScene);
-  const vec3 display = clamp(curve(exposed), 0.0, 1.0);
+  const vec3 display = clamp(GNOMON_PROBED(curved, curve(exposed)), 0.0, 1.0);
+  GNOMON_PROBE(scene, scene);
+  GNOMON_PROBE(exposed, exposed);
+  GNOMON_PROBE(display, display);
   imageStore(target, pixel,
              vec4(transfer(display.r), transfer(display.g), transfer(display.b), 1.0));
 }

@@ -36,6 +36,10 @@ const bool registered = registerKernel({
     .functions = {.file = "tonemap/resolve.functions.glsl",
                   .slots = {{.name = "curve", .push = "curve"},
                             {.name = "transfer", .push = "transfer"}}},
+    .probes = describe<ResolveProbes>(
+        "ResolveProbes", field("hdr", &ResolveProbes::hdr), field("bloom", &ResolveProbes::bloom),
+        field("scene", &ResolveProbes::scene), field("exposed", &ResolveProbes::exposed),
+        field("curved", &ResolveProbes::curved), field("display", &ResolveProbes::display)),
     .summary = "bloom, exposure, tone curve and transfer function of an HDR frame",
 });
 

@@ -23,6 +23,16 @@ struct Resolve {         // push constants
   uint transfer;         // kNone .. kSrgb; anything else counts as kNone
 };
 
+// What a kernel may name on its way, in the order of computation; linear, Rec. 709 primaries.
+struct ResolveProbes {
+  vec3 hdr;      // of the pixel, as it counts, [-kMaxScene, kMaxScene]
+  vec3 bloom;    // at the centre of the pixel, likewise
+  vec3 scene;    // before exposure
+  vec3 exposed;  // what enters the curve, [0, kMaxScene]
+  vec3 curved;   // what leaves it
+  vec3 display;  // [0, 1]
+};
+
 // Tone curves.
 const uint kLinear = 0;     // x
 const uint kReinhard = 1;   // Reinhard et al. 2002, eq. 3

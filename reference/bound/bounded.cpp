@@ -41,7 +41,14 @@ Bounded Bounded::between(double lo, double hi) noexcept {
 
 Bounded Bounded::input(float x) noexcept { return widened(Bounded(x)); }
 
-Bounded named(const Bounded& x, const char*) noexcept { return widened(x); }
+Bounded named(const Bounded& x, const char* name) noexcept { return reported(widened(x), name); }
+
+Bounded reported(const Bounded& x, const char* name) noexcept {
+  detail::report(&x, 1, name);
+  return x;
+}
+
+Bounded detail::widenedByRules(const Bounded& x) noexcept { return widened(x); }
 
 Bounded alsoAs(const Bounded& ours, const Bounded& other) noexcept {
   if (rules().widenUlp == 0) return ours;

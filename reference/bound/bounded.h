@@ -16,6 +16,7 @@
 
 #include <cassert>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <iosfwd>
 #include <utility>
@@ -74,6 +75,11 @@ void PrintTo(const Bounded& x, std::ostream* out);  // GoogleTest's hook
 Bounded named(const Bounded& x, const char* name) noexcept;
 inline double named(double x, const char*) noexcept { return x; }
 
+// An intermediate that is only told to whoever records (recording.h): nothing is widened, because
+// it is an input, or no arrangement has it otherwise.
+Bounded reported(const Bounded& x, const char* name) noexcept;
+inline double reported(double x, const char*) noexcept { return x; }
+
 // Two expressions of one quantity, of which ours is the first. Where the rules widen, an
 // arrangement may start from either: their hull, which is no ambiguity.
 Bounded alsoAs(const Bounded& ours, const Bounded& other) noexcept;
@@ -85,6 +91,10 @@ Bounded join(const Bounded& a, const Bounded& b) noexcept;
 Bounded unspecified(Operation operation, double value, Flags flags) noexcept;
 
 namespace detail {
+
+Bounded widenedByRules(const Bounded& x) noexcept;
+// Tells a whole vector at once.
+void report(const Bounded* components, std::size_t n, const char* name) noexcept;
 
 Bounded addNonFinite(const Bounded& a, const Bounded& b) noexcept;
 Bounded multiplyNonFinite(const Bounded& a, const Bounded& b) noexcept;

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "reference/bound/recording.h"
+
 namespace gnomon {
 namespace {
 
@@ -43,8 +45,18 @@ bool Trail::advance() noexcept {
   return true;
 }
 
-FollowTrail::FollowTrail(Trail& trail) noexcept : outer_(currentTrail) { currentTrail = &trail; }
-FollowTrail::~FollowTrail() { currentTrail = outer_; }
+Trail::~Trail() {
+  if (Recording* recording = Recording::current()) recording->endExploration(*this);
+}
+
+FollowTrail::FollowTrail(Trail& trail) noexcept : trail_(&trail), outer_(currentTrail) {
+  currentTrail = &trail;
+  if (Recording* recording = Recording::current()) recording->beginPath(trail);
+}
+FollowTrail::~FollowTrail() {
+  currentTrail = outer_;
+  if (Recording* recording = Recording::current()) recording->endPath(*trail_);
+}
 
 void throwPlainDiffers() {
   throw std::logic_error(

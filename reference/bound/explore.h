@@ -38,6 +38,10 @@ namespace detail {
 // The undecided decisions of one exploration, in the order in which the model meets them.
 class Trail {
  public:
+  Trail() noexcept = default;
+  ~Trail();  // what was recorded on its paths is joined
+  Trail(const Trail&) = delete;
+  Trail& operator=(const Trail&) = delete;
   bool decide(const Decision& decision) noexcept;
   // On to the next combination; false after the last, and when there are too many.
   bool advance() noexcept;
@@ -68,6 +72,7 @@ class FollowTrail {
   FollowTrail& operator=(const FollowTrail&) = delete;
 
  private:
+  Trail* trail_;
   Trail* outer_;
 };
 

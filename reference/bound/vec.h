@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <tuple>
+#include <type_traits>
 
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
@@ -196,15 +197,25 @@ V select(const Condition& condition, const V& a, const V& b) {
   return zip(a, b, [&](const auto& x, const auto& y) { return select(condition, x, y); });
 }
 template <AnyVec V>
-V named(const V& a, const char* name) {
-  return map(a, [&](const auto& x) { return named(x, name); });
-}
-
-template <AnyVec V>
 std::array<ScalarOf<V>, V::kSize> components(const V& a) {
   std::array<ScalarOf<V>, V::kSize> result;
   for (std::size_t i = 0; i < V::kSize; ++i) result[i] = a[i];
   return result;
+}
+template <AnyVec V>
+V reported(const V& a, const char* name) {
+  if constexpr (std::is_same_v<ScalarOf<V>, Bounded>) {
+    const auto all = components(a);
+    detail::report(all.data(), all.size(), name);
+  }
+  return a;
+}
+template <AnyVec V>
+V named(const V& a, const char* name) {
+  if constexpr (std::is_same_v<ScalarOf<V>, Bounded>)
+    return reported(map(a, detail::widenedByRules), name);
+  else
+    return a;
 }
 
 template <AnyVec V>

@@ -100,17 +100,19 @@ Vec3<T> F_SchlickRoughness(const T& NoV, const Vec3<T>& F0, const T& r) {
 
 template <class T>
 ShadedOf<T> evaluate(const Sample& s) {
-  const Vec3<T> n = unitOrZero<T>(s.normal), v = unitOrZero<T>(s.view), l = unitOrZero<T>(s.light);
-  const Vec3<T> halfway = v + l;
+  const Vec3<T> n = reported(unitOrZero<T>(s.normal), "n");
+  const Vec3<T> v = reported(unitOrZero<T>(s.view), "v");
+  const Vec3<T> l = reported(unitOrZero<T>(s.light), "l");
+  const Vec3<T> halfway = reported(v + l, "halfway");
   if (isZero(n) || isZero(v) || isZero(l) || largestComponent(halfway) < T(kShortestHalf))
     return {T(0), T(0), zero<T>(), zero<T>(), zero<T>(), zero<T>(), zero<T>()};
 
-  const T r = limited<T>(s.roughness, kMinRoughness, 1);
-  const T metallic = limited<T>(s.metallic, 0, 1);
-  const Vec3<T> albedo = limited<T>(s.albedo, 1);
-  const Vec3<T> irradiance = limited<T>(s.irradiance, kMaxIrradiance);
+  const T r = reported(limited<T>(s.roughness, kMinRoughness, 1), "r");
+  const T metallic = reported(limited<T>(s.metallic, 0, 1), "metallic");
+  const Vec3<T> albedo = reported(limited<T>(s.albedo, 1), "albedo");
+  const Vec3<T> irradiance = reported(limited<T>(s.irradiance, kMaxIrradiance), "irradiance");
   const T scale = inversesqrt(dot(halfway, halfway));
-  const Vec3<T> nxh = cross(n, halfway) * scale;
+  const Vec3<T> nxh = reported(cross(n, halfway) * scale, "nxh");
   const T NoV = named(max(cosine(dot(n, v)), T(kMinNoV)), "NoV");
   const T NoL = named(cosine(dot(n, l)), "NoL");
   const T VoH = named(cosine(dot(v, halfway) * scale), "VoH");
@@ -123,7 +125,8 @@ ShadedOf<T> evaluate(const Sample& s) {
   o.F = named(F_Schlick(VoH, F0), "F");
   o.ambientF = named(F_SchlickRoughness(NoV, F0, r), "ambientF");
   o.diffuse = (splat(T(1)) - o.F) * (T(1) - metallic) * albedo / pi<T>();
-  o.specular = o.F * (o.D * o.G / max(T(4) * NoV * NoL, T(kMinDenominator)));
+  o.specular =
+      o.F * (o.D * o.G / reported(max(T(4) * NoV * NoL, T(kMinDenominator)), "denominator"));
   o.radiance = (o.diffuse + o.specular) * NoL * irradiance;
   return o;
 }

@@ -124,13 +124,14 @@ Vec3<T> bloomAt(const Pixels& bloom, const uvec2& size, const uvec2& pixel) {
 
 template <class T>
 Vec4<T> resolve(const Resolve& push, const Pixels& hdr, const Pixels& bloom, const uvec2& pixel) {
-  const Vec3<T> scene =
-      named(texel<T>(hdr, pixel.x, pixel.y) +
-                bloomAt<T>(bloom, push.size, pixel) * input<T>(push.bloomIntensity),
-            "scene");
+  const Vec3<T> scene = named(
+      reported(texel<T>(hdr, pixel.x, pixel.y), "hdr") +
+          reported(bloomAt<T>(bloom, push.size, pixel), "bloom") * input<T>(push.bloomIntensity),
+      "scene");
   const Vec3<T> exposed =
       named(clamp(scene * input<T>(push.exposure), T(0), T(kMaxScene)), "exposed");
-  const Vec3<T> display = named(clamp(curve(push.curve, exposed), T(0), T(1)), "display");
+  const Vec3<T> display =
+      named(clamp(reported(curve(push.curve, exposed), "curved"), T(0), T(1)), "display");
   return {map(display, [&](const T& x) { return transfer(push.transfer, x); }), T(1)};
 }
 
