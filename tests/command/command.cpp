@@ -1,11 +1,9 @@
 #include "tests/command/command.h"
 
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 
 namespace gnomon {
@@ -24,23 +22,6 @@ Said gnomonSays(const std::string& arguments, const std::string& streams) {
   const int status = pclose(pipe);
   said.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return said;
-}
-
-Scratch::Scratch() {
-  std::string name = (std::filesystem::temp_directory_path() / "gnomon_XXXXXX").string();
-  folder = mkdtemp(name.data());
-}
-
-Scratch::~Scratch() {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder, ignored);
-}
-
-std::filesystem::path Scratch::file(const std::string& name, const std::string& text) const {
-  const std::filesystem::path path = folder / name;
-  std::filesystem::create_directories(path.parent_path());
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
 }
 
 }  // namespace gnomon
