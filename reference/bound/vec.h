@@ -304,7 +304,7 @@ Mat<V> operator*(const Mat<V>& a, const Mat<V>& b) {
 }
 
 // A kernel's inputs, from the contract's types: a double takes the value, a Bounded is
-// Bounded::input.
+// Bounded::input, an Altered is Altered::input.
 template <class T>
 T input(float x) {
   if constexpr (std::is_same_v<T, double>) {

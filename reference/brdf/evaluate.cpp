@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "reference/bound/altered.h"
 #include "reference/bound/bounded.h"
 
 namespace gnomon::brdf {
@@ -138,5 +139,11 @@ template Vec3<double> F_Schlick(const double&, const Vec3<double>&);
 template Vec3<double> F_SchlickRoughness(const double&, const Vec3<double>&, const double&);
 template ShadedOf<double> evaluate(const Sample&);
 template ShadedOf<Bounded> evaluate(const Sample&);
+template Altered D_GGX(const Vec3<Altered>&, const Altered&, const Altered&);
+template Altered kDirect(const Altered&);
+template Altered G1_Schlick(const Altered&, const Altered&);
+template Vec3<Altered> F_Schlick(const Altered&, const Vec3<Altered>&);
+template Vec3<Altered> F_SchlickRoughness(const Altered&, const Vec3<Altered>&, const Altered&);
+template ShadedOf<Altered> evaluate(const Sample&);
 
 }  // namespace gnomon::brdf

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "reference/bound/altered.h"
 #include "reference/bound/builtins.h"
 
 namespace gnomon::post {
@@ -83,5 +84,7 @@ Vec4<T> view(const Views& push, const Surface& surface) {
 template double linearDepth(const double&, const double&, const double&);
 template Vec4<double> view(const Views&, const Surface&);
 template Vec4<Bounded> view(const Views&, const Surface&);
+template Altered linearDepth(const Altered&, const Altered&, const Altered&);
+template Vec4<Altered> view(const Views&, const Surface&);
 
 }  // namespace gnomon::post

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "reference/bound/altered.h"
 #include "reference/bound/bounded.h"
 
 namespace gnomon::tonemap {
@@ -153,5 +154,14 @@ template Vec3<Bounded> curve(uint, const Vec3<Bounded>&);
 template Bounded transfer(uint, const Bounded&);
 template Vec3<Bounded> bloomAt(const Pixels&, const uvec2&, const uvec2&);
 template Vec4<Bounded> resolve(const Resolve&, const Pixels&, const Pixels&, const uvec2&);
+template Altered reinhard(const Altered&);
+template Altered narkowicz(const Altered&);
+template Vec3<Altered> hill(const Vec3<Altered>&);
+template Altered encodeGamma(const Altered&);
+template Altered encodeSrgb(const Altered&);
+template Vec3<Altered> curve(uint, const Vec3<Altered>&);
+template Altered transfer(uint, const Altered&);
+template Vec3<Altered> bloomAt(const Pixels&, const uvec2&, const uvec2&);
+template Vec4<Altered> resolve(const Resolve&, const Pixels&, const Pixels&, const uvec2&);
 
 }  // namespace gnomon::tonemap
