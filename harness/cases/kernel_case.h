@@ -110,11 +110,13 @@ std::vector<T> elementsOf(const std::vector<std::byte>& bytes) {
   return all;
 }
 
-/// Calls f for every number of a model's result, in the order of its scalars().
+/// Calls f for every number of a model's result, in the order of its scalars(), or of an array.
 template <class T, class F>
 void forEachScalar(T& x, F& f) {
   if constexpr (requires { x.scalars(); })
     std::apply([&](auto&... members) { (forEachScalar(members, f), ...); }, x.scalars());
+  else if constexpr (requires { x.begin(); })
+    for (auto& element : x) forEachScalar(element, f);
   else
     f(x);
 }
