@@ -1,8 +1,9 @@
 // The model of brdf/evaluate against truth that does not come from it. No GPU.
 //
 // Covered: D against Walter's printed form, its normalisation, an importance sampler (chi-square);
-// Smith's G1 against a published table and the weak furnace; Schlick's fit against Smith; Fresnel's
-// ends; closed forms and bounds of the directional albedo; what must be told apart.
+// Smith's G1 against a published table and the weak furnace; Schlick's fit against Smith and at
+// closed forms; Fresnel's ends and powers; a whole sample against the contract and those parts, bad
+// input included; closed forms and bounds of the directional albedo; what must be told apart.
 // Not covered: measured materials.
 #include <array>
 #include <cmath>
@@ -12,7 +13,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "harness/cases/kernel_case.h"
+#include "harness/cases/modelled.h"
 #include "harness/cases/random.h"
 #include "reference/brdf/evaluate.h"
 #include "reference/truth/microfacet.h"
@@ -29,6 +30,32 @@ constexpr double kPi = std::numbers::pi;
 // half an ULP for each constant and its power, here pi once and twice for squares.
 constexpr double kFloatConstants = 4 * std::numeric_limits<float>::epsilon();
 
+// The model's functions, for every test but those that ask its own bound (modelled.h).
+double D_GGX(const Vec3<double>& nxh, double NoH, double alpha) {
+  return modelled("D_GGX", [&]<class T>() {
+    return brdf::D_GGX<T>(given<T>(nxh), given<T>(NoH), given<T>(alpha));
+  });
+}
+double kDirect(double r) {
+  return modelled("kDirect", [&]<class T>() { return brdf::kDirect<T>(given<T>(r)); });
+}
+double G1_Schlick(double NoX, double k) {
+  return modelled("G1_Schlick",
+                  [&]<class T>() { return brdf::G1_Schlick<T>(given<T>(NoX), given<T>(k)); });
+}
+Vec3<double> F_Schlick(double VoH, const Vec3<double>& F0) {
+  return modelled("F_Schlick",
+                  [&]<class T>() { return brdf::F_Schlick<T>(given<T>(VoH), given<T>(F0)); });
+}
+Vec3<double> F_SchlickRoughness(double NoV, const Vec3<double>& F0, double r) {
+  return modelled("F_SchlickRoughness", [&]<class T>() {
+    return brdf::F_SchlickRoughness<T>(given<T>(NoV), given<T>(F0), given<T>(r));
+  });
+}
+ShadedOf<double> evaluate(const Sample& s) {
+  return modelled("evaluate", [&]<class T>() { return brdf::evaluate<T>(s); });
+}
+
 double modelD(double theta, double alpha) {
   return D_GGX({0, std::sin(theta), 0}, std::cos(theta), alpha);
 }
@@ -40,6 +67,20 @@ TEST(BrdfEvaluateModel, DIsTheFormThatWalterPrinted) {
     for (double theta = 0; theta < kPi / 2; theta += kPi / 64)
       EXPECT_LE(std::abs(modelD(theta, alpha) / truth::ggx(theta, alpha) - 1), kFloatConstants)
           << "alpha " << alpha << ", theta " << theta;
+}
+
+// sin^2 is that of |n x h|, whichever way it points: turned about any axis D is the same, and so it
+// is mirrored where NoH < 0. Six roundings of sin^2 at most, and twice that in its square.
+TEST(BrdfEvaluateModel, DDoesNotDependOnTheDirectionOfNCrossH) {
+  constexpr double kDouble = 16 * std::numeric_limits<double>::epsilon();
+  Random random(caseSeed());
+  for (int i = 0; i < 1000; ++i) {
+    const double alpha = kAlphas[random.below(kAlphas.size())], theta = random.uniform(0, kPi / 2);
+    const glm::dvec3 to = random.direction() * std::sin(theta);
+    for (const double NoH : {std::cos(theta), -std::cos(theta)})
+      EXPECT_LE(std::abs(D_GGX({to.x, to.y, to.z}, NoH, alpha) / modelD(theta, alpha) - 1), kDouble)
+          << alpha << " " << theta;
+  }
 }
 
 TEST(BrdfEvaluateModel, DTimesNoHIntegratesToOne) {
@@ -133,6 +174,42 @@ TEST(BrdfEvaluateModel, FresnelIsF0HeadOnAndOneAtGrazing) {
   }
 }
 
+// Schlick 1994, eq. 15 at cosines whose fifth powers are exact: (1/2)^5 = 1/32, (1/4)^5 = 1/1024.
+TEST(BrdfEvaluateModel, FresnelRisesWithTheFifthPower) {
+  EXPECT_EQ(F_Schlick(0.5, Vec3<double>{0, 0.5, 1}).x, 1.0 / 32);
+  EXPECT_EQ(F_Schlick(0.5, Vec3<double>{0, 0.5, 1}).y, 0.5 + 0.5 / 32);
+  EXPECT_EQ(F_Schlick(0.75, Vec3<double>{0.5, 1, 0}).z, 1.0 / 1024);
+  // With r = 1/2 grazing reflectance is max(1/2, F0), so it rises by 1/2, 1/4 and not at all.
+  constexpr std::array kF0 = {0.0, 0.25, 0.75}, kRise = {0.5, 0.25, 0.0};
+  for (const auto& [NoV, power] : {std::array{0.5, 1.0 / 32}, std::array{0.75, 1.0 / 1024}})
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+      const Vec3<double> F = F_SchlickRoughness(NoV, {kF0[i], kF0[j], kF0[k]}, 0.5);
+      EXPECT_EQ(F.x, kF0[i] + kRise[i] * power);
+      EXPECT_EQ(F.y, kF0[j] + kRise[j] * power);
+      EXPECT_EQ(F.z, kF0[k] + kRise[k] * power);
+    }
+}
+
+// Karis 2013, p. 3: k = (r + 1)^2 / 8, all of them exact.
+TEST(BrdfEvaluateModel, KForPunctualLightGoesFromAnEighthToAHalf) {
+  EXPECT_EQ(kDirect(0.0), 1.0 / 8);
+  EXPECT_EQ(kDirect(0.5), 9.0 / 32);
+  EXPECT_EQ(kDirect(1.0), 1.0 / 2);
+}
+
+// Schlick 1994, eq. 19: nothing is hidden head on or where k = 0; everything is at the horizon,
+// with slope 1 / k; and at k = 1/2, x = 1/2 two thirds are left.
+TEST(BrdfEvaluateModel, SchlicksG1HasItsEndsItsSlopeAndItsMiddle) {
+  for (const double k : {0.0, 0.125, 0.25, 0.5}) EXPECT_EQ(G1_Schlick(1.0, k), 1);
+  for (const double x : {0.0625, 0.5, 0.875}) EXPECT_EQ(G1_Schlick(x, 0.0), 1);
+  for (const double k : {0.125, 0.25, 0.5}) {
+    EXPECT_EQ(G1_Schlick(0.0, k), 0);
+    EXPECT_EQ(G1_Schlick(0x1p-60, k), 0x1p-60 / k);  // the other term is below 2^-53 of k
+  }
+  EXPECT_EQ(G1_Schlick(0.5, 0.5), 2.0 / 3);
+}
+
 // D = 1/pi and G1(x) = 2x / (1 + x) at alpha = 1, so E(NoV = 1) = int mu / (1 + mu) = 1 - ln 2.
 TEST(BrdfEvaluateModel, SpecularAlbedoOfARoughMirrorSeenHeadOnIsOneMinusLogTwo) {
   const double albedo = truth::GaussLegendre(64)(0, 1, [](double mu) {
@@ -143,7 +220,7 @@ TEST(BrdfEvaluateModel, SpecularAlbedoOfARoughMirrorSeenHeadOnIsOneMinusLogTwo) 
                    .light = vec3(std::sqrt(1 - mu * mu), 0, mu),
                    .albedo = vec3(1),
                    .irradiance = vec3(1)};
-    return 2 * kPi * evaluate<double>(s).radiance.x;
+    return 2 * kPi * evaluate(s).radiance.x;
   });
   // The light's direction is rounded to float as well.
   EXPECT_LE(std::abs(albedo - (1 - std::numbers::ln2)), kFloatConstants);
@@ -166,6 +243,157 @@ TEST(BrdfEvaluateModel, AMirrorReflectsAtMostWhatArrives) {
       EXPECT_LE(specularAlbedo(NoV, r, 1), 1) << r << " " << NoV;
 }
 
+float countedIn(float x, float lo, float hi) {
+  return std::isfinite(x) ? std::clamp(x, lo, hi) : std::clamp(0.0f, lo, hi);
+}
+
+glm::dvec3 countedIn(const vec3& v, float lo, float hi) {
+  return {countedIn(v.x, lo, hi), countedIn(v.y, lo, hi), countedIn(v.z, lo, hi)};
+}
+
+double largestOf(const glm::dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+Vec3<double> vecOf(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+glm::dvec3 vecOf(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
+
+// What the contract says of a sample (kernels/brdf/brdf.h), made of the functions that the tests
+// above have tested, each of a unit half vector. Lobes: Cook and Torrance 1982 with Karis' 4 NoV
+// NoL; Lambert.
+ShadedOf<double> madeOfItsParts(const Sample& s) {
+  const auto unitOrZero = [](const vec3& x) {
+    const glm::dvec3 u = countedIn(x, -1, 1);
+    return largestOf(u) >= kShortestUnit ? u : glm::dvec3(0);
+  };
+  const glm::dvec3 n = unitOrZero(s.normal), v = unitOrZero(s.view), l = unitOrZero(s.light);
+  const glm::dvec3 zero(0);
+  if (n == zero || v == zero || l == zero || largestOf(v + l) < kShortestHalf) return {};
+
+  const glm::dvec3 h = glm::normalize(v + l), albedo = countedIn(s.albedo, 0, 1);
+  const double r = countedIn(s.roughness, kMinRoughness, 1), metallic = countedIn(s.metallic, 0, 1);
+  const auto cosine = [](const glm::dvec3& a, const glm::dvec3& b) {
+    return std::clamp(glm::dot(a, b), 0.0, 1.0);
+  };
+  const double NoV = std::max<double>(cosine(n, v), kMinNoV), NoL = cosine(n, l);
+  const glm::dvec3 F0 = glm::mix(glm::dvec3(kDielectricF0), albedo, metallic);
+  const double k = brdf::kDirect<double>(r);
+  const double D = brdf::D_GGX<double>(vecOf(glm::cross(n, h)), glm::dot(n, h), r * r);
+  const double G = brdf::G1_Schlick<double>(NoV, k) * brdf::G1_Schlick<double>(NoL, k);
+  const glm::dvec3 F = vecOf(brdf::F_Schlick<double>(cosine(v, h), vecOf(F0)));
+  const glm::dvec3 diffuse =
+      (1.0 - F) * (1 - metallic) * albedo / double{std::numbers::pi_v<float>};
+  const glm::dvec3 specular = D * F * G / std::max<double>(4 * NoV * NoL, kMinDenominator);
+  return {D,
+          G,
+          vecOf(F),
+          brdf::F_SchlickRoughness<double>(NoV, vecOf(F0), r),
+          vecOf(diffuse),
+          vecOf(specular),
+          vecOf((diffuse + specular) * NoL * countedIn(s.irradiance, 0, kMaxIrradiance))};
+}
+
+constexpr std::array kScalars = {
+    "D",          "G",          "F.x",        "F.y",        "F.z",       "ambientF.x",
+    "ambientF.y", "ambientF.z", "diffuse.x",  "diffuse.y",  "diffuse.z", "specular.x",
+    "specular.y", "specular.z", "radiance.x", "radiance.y", "radiance.z"};
+
+std::array<double, kScalars.size()> scalarsOf(ShadedOf<double> shaded) {
+  std::array<double, kScalars.size()> all{};
+  auto take = [at = all.begin()](double x) mutable { *at++ = x; };
+  forEachScalar(shaded, take);
+  return all;
+}
+
+// A unit half vector rounds n x h by 2^-52 of 1; inside the lobe |n x h| is about alpha, and D goes
+// with its inverse fourth power. All else are a few roundings of numbers of about 1.
+const double kUnitHalf =
+    8 * std::numeric_limits<double>::epsilon() / (double{kMinRoughness} * kMinRoughness);
+
+void expectMadeOfItsParts(const Sample& s) {
+  const auto got = scalarsOf(evaluate(s)), expected = scalarsOf(madeOfItsParts(s));
+  for (std::size_t i = 0; i < got.size(); ++i)
+    EXPECT_LE(std::abs(got[i] - expected[i]), kUnitHalf * std::max(1.0, std::abs(expected[i])))
+        << kScalars[i] << " is " << got[i] << ", of its parts " << expected[i] << "\n"
+        << describe(s);
+}
+
+TEST(BrdfEvaluateModel, EvaluateIsMadeOfItsParts) {
+  constexpr std::size_t kEach = 250;
+  for (const auto& domain : {bulk(kEach, caseSeed()), lobe(kEach, caseSeed()),
+                             grazing(kEach, caseSeed()), rough(kEach, caseSeed())})
+    for (const Sample& s : domain) expectMadeOfItsParts(s);
+}
+
+TEST(BrdfEvaluateModel, BadInputCountsAsTheContractSays) {
+  for (const Sample& s : degenerate()) expectMadeOfItsParts(s);
+}
+
+// By the contract a half vector counts whose largest component, whichever and of whichever sign, is
+// 2^-16 or more. v + l is exact here: -1 + 1 and a number of few digits.
+TEST(BrdfEvaluateModel, TheHalfVectorCountsFromItsShortestOn) {
+  const float least = kShortestHalf, below = std::nextafter(least, 0.0f);
+  for (const int axis : {0, 1, 2})
+    for (const float sign : {1.0f, -1.0f}) {
+      const auto D = [&](float half) {
+        vec3 v(0), l(0);
+        v[(axis + 1) % 3] = 1, l[(axis + 1) % 3] = -1;
+        l[axis] = sign * half;
+        // n = v, which is square to the half vector: D = alpha^2 / pi, not 0.
+        return evaluate({.normal = v,
+                         .roughness = 1,
+                         .view = v,
+                         .metallic = 0,
+                         .light = l,
+                         .albedo = vec3(1),
+                         .irradiance = vec3(1)})
+            .D;
+      };
+      EXPECT_GT(D(least), 0) << axis;
+      EXPECT_EQ(D(below), 0) << axis;
+    }
+}
+
+// The same for unit vectors, which count from a largest component of 1/2 on.
+TEST(BrdfEvaluateModel, AUnitVectorCountsFromItsShortestOn) {
+  const float least = kShortestUnit, below = std::nextafter(least, 0.0f);
+  for (const int axis : {0, 1, 2})
+    for (const float sign : {1.0f, -1.0f})
+      for (const int which : {0, 1, 2}) {
+        const auto D = [&](float length) {
+          std::array vectors = {vec3(1), vec3(1), vec3(1)};
+          vectors[static_cast<std::size_t>(which)] = vec3(0);
+          vectors[static_cast<std::size_t>(which)][axis] = sign * length;
+          return evaluate({.normal = vectors[0],
+                           .roughness = 1,
+                           .view = vectors[1],
+                           .metallic = 0,
+                           .light = vectors[2],
+                           .albedo = vec3(1),
+                           .irradiance = vec3(1)})
+              .D;
+        };
+        EXPECT_GT(D(least), 0) << axis << " " << which;
+        EXPECT_EQ(D(below), 0) << axis << " " << which;
+      }
+}
+
+// A black metal has no F0, so F is (1 - VoH)^5: nothing at all for a VoH of 1, which vectors longer
+// than a unit vector would exceed.
+TEST(BrdfEvaluateModel, ABlackMetalReflectsNothingHeadOn) {
+  const Vec3<double> F = evaluate({.normal = vec3(1),
+                                   .roughness = 0.5f,
+                                   .view = vec3(1),
+                                   .metallic = 1,
+                                   .light = vec3(1),
+                                   .albedo = vec3(0),
+                                   .irradiance = vec3(1)})
+                             .F;
+  EXPECT_EQ(F.x, 0);
+  EXPECT_EQ(F.y, 0);
+  EXPECT_EQ(F.z, 0);
+}
+
 // With albedo 1 both lobes together exceed 1, because (1 - F) weights diffuse light by the half
 // vector alone: known of this BRDF. The largest over this grid, measured with this quadrature, is
 // recorded to the digits printed here, so that a change of either lobe is seen.
@@ -183,7 +411,7 @@ TEST(BrdfEvaluateModel, DiffusePlusSpecularExceedsOneOnlyByTheKnownAmount) {
                                      std::sin(theta) * std::sin(phi), std::cos(theta)),
                        .albedo = vec3(1),
                        .irradiance = vec3(1)};
-        return evaluate<double>(s).diffuse.x * std::cos(theta);
+        return evaluate(s).diffuse.x * std::cos(theta);
       };
       highest = std::max(highest,
                          truth::hemisphere(diffuse, 1, 48) + specularAlbedo(NoV, r, kDielectricF0));
@@ -214,11 +442,14 @@ TEST(BrdfEvaluateModel, TheBoundTellsTheUsualConfusionsApart) {
     const double NoV = glm::dot(n, v), NoL = glm::dot(n, l), r = s.roughness;
     if (NoV < 0.05 || NoL < 0.05) continue;
     ++lit;
-    const auto G = [&](double k) { return G1_Schlick(NoV, k) * G1_Schlick(NoL, k); };
-    separates(G(kDirect(r)), G(r * r / 2), allowed.G);
-    separates(G(kDirect(r)), G(kDirect(r * r)), allowed.G);
+    const auto k = [](double x) { return brdf::kDirect<double>(x); };
+    const auto G = [&](double by) {
+      return brdf::G1_Schlick<double>(NoV, by) * brdf::G1_Schlick<double>(NoL, by);
+    };
+    separates(G(k(r)), G(r * r / 2), allowed.G);
+    separates(G(k(r)), G(k(r * r)), allowed.G);
     const double F0 = 0.04 * (1 - double{s.metallic}) + double{s.albedo.x} * s.metallic;
-    const auto F = [&](double c) { return F_Schlick(c, Vec3<double>{F0, F0, F0}).x; };
+    const auto F = [&](double c) { return brdf::F_Schlick<double>(c, Vec3<double>(F0)).x; };
     separates(F(glm::dot(v, glm::normalize(v + l))), F(NoV), allowed.F.x);
   }
   ASSERT_GT(lit, 500u);

@@ -11,13 +11,27 @@
 
 #include <fmt/format.h>
 
-#include "harness/cases/kernel_case.h"
+#include "harness/cases/modelled.h"
 #include "harness/cases/random.h"
 #include "harness/cases/special_floats.h"
 #include "reference/post/views.h"
 
 namespace gnomon::post {
 namespace {
+
+// The model's functions as its truth and laws call them (modelled.h).
+double linearDepth(double d, double near, double far) {
+  return modelled("linearDepth", [&]<class T>() {
+    return post::linearDepth<T>(given<T>(d), given<T>(near), given<T>(far));
+  });
+}
+Vec4<double> view(const Views& push, const Surface& surface) {
+  const char* entry = push.mode == kNormal     ? "view.normal"
+                      : push.mode == kDepth    ? "view.depth"
+                      : push.mode == kCascades ? "view.cascades"
+                                               : "view.albedo";
+  return modelled(entry, [&]<class T>() { return post::view<T>(push, surface); });
+}
 
 constexpr std::array kModes = {kAlbedo, kNormal, kDepth, kCascades};
 
@@ -223,9 +237,159 @@ TEST(PostViewsModel, TheSkyIsBlackInEveryView) {
   for (const uint mode : kModes) {
     Views push = camera({1, 1});
     push.mode = mode;
-    const Vec4<double> sky = view<double>(push, {vec3(1), vec3(1), 0});
-    EXPECT_EQ(sky.x + sky.y + sky.z, 0);
-    EXPECT_EQ(sky.w, 1);
+    const Vec4<double> sky = view(push, {vec3(1), vec3(1), 0});
+    // Clamped to the sky, though of the second the formula would be beyond the far plane.
+    const Vec4<double> below = view(push, {vec3(1), vec3(1), -1});
+    const Vec4<double> justBelow = view(push, {vec3(1), vec3(1), -0x1p-20f});
+    for (const auto& seen : {sky, below, justBelow}) {
+      EXPECT_EQ(seen.x + seen.y + seen.z, 0);
+      EXPECT_EQ(seen.w, 1);
+    }
+  }
+}
+
+// The whole is white where everything saturates; alpha is 1 in every view.
+TEST(PostViewsModel, EveryViewIsOpaque) {
+  for (const uint mode : kModes) {
+    Views push = camera({1, 1});
+    push.mode = mode;
+    EXPECT_EQ(view(push, {vec3(0.5f), vec3(0.5f), 0.5f}).w, 1) << mode;
+  }
+}
+
+// What is shown as it stands: inside [0, 1] itself, outside the nearer end, NaN and infinity 0;
+// each colour by itself.
+TEST(PostViewsModel, AlbedoAndNormalAreShownAsTheyStand) {
+  using Limits = std::numeric_limits<float>;
+  struct Shown {
+    float given;
+    double shown;
+  };
+  constexpr std::array<Shown, 8> kShown = {{{0, 0},
+                                            {0x1p-20f, 0x1p-20},
+                                            {0.25f, 0.25},
+                                            {1, 1},
+                                            {1.5f, 1},
+                                            {-0.5f, 0},
+                                            {Limits::quiet_NaN(), 0},
+                                            {Limits::infinity(), 0}}};
+  for (const uint mode : {kAlbedo, kNormal})
+    for (int c = 0; c < 3; ++c)
+      for (const Shown& x : kShown) {
+        Views push = camera({1, 1});
+        push.mode = mode;
+        vec3 colour(0.125f, 0.5f, 0.75f);
+        colour[c] = x.given;
+        const vec3 other(0.375f);
+        const Vec4<double> got =
+            mode == kAlbedo ? view(push, {colour, other, 0.5f}) : view(push, {other, colour, 0.5f});
+        for (int i = 0; i < 3; ++i)
+          EXPECT_EQ(got[static_cast<std::size_t>(i)], i == c ? x.shown : double{colour[i]})
+              << x.given << " in component " << c << " of mode " << mode;
+      }
+}
+
+// Powers of two, so that every step is exact: with far = 2 near a depth d shows
+// 1 / (1 + d) of far, which is 1/2 on the near plane, and beyond it, and 2/3 half way.
+TEST(PostViewsModel, DepthIsTheShareOfTheFarPlane) {
+  Views push = camera({1, 1});
+  push.mode = kDepth;
+  push.near = 0.5f;
+  push.far = 1;
+  const auto grey = [&](float depth) {
+    const Vec4<double> got = view(push, {vec3(0), vec3(0), depth});
+    EXPECT_EQ(got.x, got.y);
+    EXPECT_EQ(got.x, got.z);
+    return got.x;
+  };
+  EXPECT_EQ(grey(0.5f), 1 / 1.5);
+  EXPECT_EQ(grey(1), 0.5);
+  EXPECT_EQ(grey(2), 0.5);  // clamped to the near plane
+  // The smallest depths that are no sky: a share of 1 less their own size.
+  EXPECT_EQ(grey(0x1p-20f), 1 / (1 + 0x1p-20));
+  push.near = 0x1p-20f;  // however small a share
+  EXPECT_EQ(grey(1), 0x1p-20);
+  push.near = 0.5f;
+  push.far = 4;  // 1 / (1 + 7 d)
+  EXPECT_EQ(grey(0.5f), 1 / 4.5);
+}
+
+/// Where a cascade begins and ends, and what its tint leaves of a pixel.
+struct Range {
+  double begin, end;
+  vec3 colour;
+};
+
+std::array<Range, 4> rangesOf(const Views& push) {
+  return {{{push.near, push.splits.x, {0, 1, 0}},
+           {push.splits.x, push.splits.y, {0, 0, 1}},
+           {push.splits.y, push.splits.z, {1, 1, 0}},
+           {push.splits.z, push.splits.w, {1, 0, 0}}}};
+}
+
+// 0.7 of the cascade's colour over 0.3 of the albedo, both as floats, and a quarter brighter in the
+// last tenth of the range, unless it is the last. A depth's half ULP moves the distance by 2^-24 of
+// it, which is at most 250 / 170 of a range: 5e-6 to either side of the zone's begin are clear.
+TEST(PostViewsModel, CascadesTintTheDimmedAlbedo) {
+  Views push = camera({1, 1});
+  push.mode = kCascades;
+  const vec3 albedo(0.25f, 0.5f, 1);
+  const std::array ranges = rangesOf(push);
+  for (std::size_t i = 0; i < ranges.size(); ++i)
+    for (const double share : {0.05, 0.9 - 5e-6, 0.9 + 5e-6, 0.95}) {
+      const auto& [begin, end, colour] = ranges[i];
+      const double distance = begin + share * (end - begin);
+      const double brighter = share > 0.9 && i < 3 ? 1.25 : 1;
+      const Vec4<double> got = view(push, {albedo, vec3(0), depthOf(distance, push)});
+      for (int c = 0; c < 3; ++c) {
+        const double shown = double{0.7f} * colour[c] + double{0.3f} * albedo[c];
+        // 0.7 and 0.3 of 1 make up 1, or more where it is brighter: saturated.
+        EXPECT_EQ(got[static_cast<std::size_t>(c)], std::min(1.0, brighter * shown))
+            << "cascade " << i << " at " << share << ", component " << c;
+      }
+      EXPECT_EQ(got.w, 1);
+    }
+}
+
+// Bad albedo counts as the contract says before it is dimmed: -1 as 0, 2 as 1, NaN as 0.
+TEST(PostViewsModel, AlbedoIsClampedBeforeACascadeDimsIt) {
+  Views push = camera({1, 1});
+  push.mode = kCascades;
+  const std::array ranges = rangesOf(push);
+  for (std::size_t i = 0; i < ranges.size(); ++i)
+    for (const double share : {0.5, 0.95}) {
+      const auto& [begin, end, colour] = ranges[i];
+      const float depth = depthOf(begin + share * (end - begin), push);
+      for (int c = 0; c < 3; ++c)
+        for (const auto& [bad, counted] :
+             {std::array{-1.0f, 0.0f}, std::array{2.0f, 1.0f}, std::array{std::nanf(""), 0.0f}}) {
+          vec3 albedo(0.5f), good(0.5f);
+          albedo[c] = bad, good[c] = counted;
+          const Vec4<double> got = view(push, {albedo, vec3(0), depth});
+          const double brighter = share > 0.9 && i < 3 ? 1.25 : 1;
+          for (int k = 0; k < 3; ++k)
+            EXPECT_EQ(got[static_cast<std::size_t>(k)],
+                      std::min(1.0, brighter * (double{0.7f} * colour[k] + double{0.3f} * good[k])))
+                << "cascade " << i << ", component " << k << " of " << bad;
+        }
+    }
+}
+
+// A distance that equals a split belongs to the cascade that ends there. With near 1 and far 3 the
+// depth 1/4 is at 3 / (1 + 1/2) = 2, exactly.
+TEST(PostViewsModel, ACascadeHoldsItsEnd) {
+  Views push = camera({1, 1});
+  push.mode = kCascades;
+  push.near = 1;
+  push.far = 3;
+  constexpr std::array<std::array<float, 4>, 3> kSplits = {
+      {{2, 2.5f, 2.75f, 3}, {1.5f, 2, 2.5f, 3}, {1.25f, 1.5f, 2, 3}}};
+  for (std::size_t i = 0; i < kSplits.size(); ++i) {
+    push.splits = {kSplits[i][0], kSplits[i][1], kSplits[i][2], kSplits[i][3]};
+    const vec3 colour = rangesOf(push)[i].colour;
+    const Vec4<double> got = view(push, {vec3(0), vec3(0), 0.25f});
+    for (int c = 0; c < 3; ++c)
+      EXPECT_EQ(got[static_cast<std::size_t>(c)] > 0, colour[c] > 0) << i << ", component " << c;
   }
 }
 
@@ -235,11 +399,11 @@ TEST(PostViewsModel, TheBlendZoneIsTheLastTenthOfACascade) {
   push.mode = kCascades;
   const auto green = [&](double share) {
     const double distance = push.near + share * (double{push.splits.x} - push.near);
-    return view<double>(push, {vec3(0), vec3(0), depthOf(distance, push)}).y;
+    return view(push, {vec3(0), vec3(0), depthOf(distance, push)}).y;
   };
   EXPECT_EQ(green(0.95) / green(0.85), kBlendBrighter);
   const auto red = [&](double distance) {
-    return view<double>(push, {vec3(0), vec3(0), depthOf(distance, push)}).x;
+    return view(push, {vec3(0), vec3(0), depthOf(distance, push)}).x;
   };
   EXPECT_EQ(red(245), red(100));
 }

@@ -12,7 +12,7 @@
 #include <glm/glm.hpp>
 #include <gtest/gtest.h>
 
-#include "harness/cases/kernel_case.h"
+#include "harness/cases/modelled.h"
 #include "harness/cases/random.h"
 #include "reference/tonemap/resolve.h"
 
@@ -28,6 +28,34 @@ constexpr double kDouble = 4 * std::numeric_limits<double>::epsilon();
 
 constexpr std::array kCurves = {kLinear, kReinhard, kNarkowicz, kHill};
 constexpr std::array kTransfers = {kNone, kGamma, kSrgb};
+
+// The model's functions as the tests call them (modelled.h).
+double reinhard(double x) {
+  return modelled("reinhard", [&]<class T>() { return tonemap::reinhard<T>(given<T>(x)); });
+}
+double narkowicz(double x) {
+  return modelled("narkowicz", [&]<class T>() { return tonemap::narkowicz<T>(given<T>(x)); });
+}
+Vec3<double> hill(const Vec3<double>& x) {
+  return modelled("hill", [&]<class T>() { return tonemap::hill<T>(given<T>(x)); });
+}
+double encodeGamma(double x) {
+  return modelled("encodeGamma", [&]<class T>() { return tonemap::encodeGamma<T>(given<T>(x)); });
+}
+double encodeSrgb(double x) {
+  return modelled("encodeSrgb", [&]<class T>() { return tonemap::encodeSrgb<T>(given<T>(x)); });
+}
+Vec3<double> curve(uint which, const Vec3<double>& x) {
+  constexpr std::array kEntries = {"curve.linear", "curve.reinhard", "curve.narkowicz",
+                                   "curve.hill"};
+  return modelled(kEntries.at(which),
+                  [&]<class T>() { return tonemap::curve<T>(which, given<T>(x)); });
+}
+double transfer(uint which, double x) {
+  constexpr std::array kEntries = {"transfer.none", "transfer.gamma", "transfer.srgb"};
+  return modelled(kEntries.at(which),
+                  [&]<class T>() { return tonemap::transfer<T>(which, given<T>(x)); });
+}
 
 double hillGrey(double x) { return hill(Vec3<double>(x)).x; }
 
@@ -110,7 +138,54 @@ TEST(TonemapResolveModel, HillKeepsGreyGrey) {
 // The fit's constant terms alone, which no other value shows; they move by half an ULP each.
 TEST(TonemapResolveModel, HillsBlackIsTheRatioOfTheConstantTerms) {
   const double black = 0.000090537 / 0.238081;
-  EXPECT_LE(std::abs(hillGrey(0) + black), (3 * 0.5e-5 + kHillConstants) * black);
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_LE(std::abs(hill(Vec3<double>(0))[c] + black), (3 * 0.5e-5 + kHillConstants) * black);
+}
+
+// Around black the curve is linear: how component i rises with colour c is the printed matrices'
+// product times the slope of the printed fit at 0, (p / q)' = (p' q - p q') / q^2. Every term of it
+// is moved by half an ULP of one coefficient of either matrix and of the slope's five factors.
+TEST(TonemapResolveModel, HillRisesFromBlackByThePrintedMatricesAndTheFitsSlope) {
+  const glm::dmat3 in(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566,
+                      0.83777);
+  const glm::dmat3 out(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605,
+                       1.07602);
+  const double p = -0.000090537, dp = 0.0245786, q = 0.238081, dq = 0.4329510;
+  const double slope = (dp * q - p * dq) / (q * q);
+  // The third derivative leaves 2^-48 of a central difference, the roundings of fit(0) 2^-40.
+  constexpr double kStep = 0x1p-24;
+  for (std::size_t c = 0; c < 3; ++c) {
+    Vec3<double> colour(0);
+    colour[c] = kStep;
+    const Vec3<double> rise = (hill(colour) - hill(-colour)) / (2 * kStep);
+    for (std::size_t i = 0; i < 3; ++i) {
+      double sum = 0, terms = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double term = out[k][static_cast<int>(i)] * in[static_cast<int>(c)][k] * slope;
+        sum += term;
+        terms += std::abs(term);
+      }
+      EXPECT_LE(std::abs(rise[i] - sum), (2 + 5) * kHalfUlp * terms) << i << " of " << c;
+    }
+  }
+}
+
+// The number chooses; the functions have been tested above, each by itself.
+TEST(TonemapResolveModel, EveryNumberIsItsOwnCurveAndTransferFunction) {
+  Random random(caseSeed());
+  const auto light = [&] { return random.chance(0.1) ? 0.0 : random.logUniform(0x1p-20, 0x1p6); };
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3<double> x{light(), light(), light()};
+    const auto each = [&](double (&of)(const double&)) { return map(x, of); };
+    const Vec3<double> expected[] = {x, each(tonemap::reinhard<double>),
+                                     each(tonemap::narkowicz<double>), tonemap::hill<double>(x)};
+    for (const uint which : kCurves)
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_EQ(curve(which, x)[c], expected[which][c]) << which << " of " << x[c];
+    EXPECT_EQ(transfer(kNone, x.x), x.x);
+    EXPECT_EQ(transfer(kGamma, x.x), tonemap::encodeGamma<double>(x.x)) << x.x;
+    EXPECT_EQ(transfer(kSrgb, x.x), tonemap::encodeSrgb<double>(x.x)) << x.x;
+  }
 }
 
 // RGB to XYZ of primaries and a white, both as chromaticities: SMPTE RP 177.
@@ -205,9 +280,12 @@ TEST(TonemapResolveModel, DecodingSrgbGivesBackWhatWasEncoded) {
 // model move either piece of about 0.04 and the 0.095 under it by a few half ULPs.
 TEST(TonemapResolveModel, SrgbIsContinuousButForTheKnownJump) {
   const double at = 0.0031308f, above = std::nextafter(at, 1.0);
-  const double jump = encodeSrgb(above) - encodeSrgb(at);
-  EXPECT_LE(std::abs(jump + 2.85e-8), 0.005e-8 + (4 * 0.095 + 0.055 + 0.04) * kHalfUlp);
-  EXPECT_NE(jump, 0);
+  for (const auto& encode : {&encodeSrgb, +[](double x) { return transfer(kSrgb, x); }}) {
+    const double jump = encode(above) - encode(at);
+    EXPECT_LE(std::abs(jump + 2.85e-8), 0.005e-8 + (4 * 0.095 + 0.055 + 0.04) * kHalfUlp);
+    EXPECT_NE(jump, 0);
+    EXPECT_EQ(encode(at), 12.92f * at);  // the piece that it belongs to, by the standard's <=
+  }
 }
 
 TEST(TonemapResolveModel, TransfersKeepBlackAndWhite) {
@@ -222,6 +300,17 @@ TEST(TonemapResolveModel, GammaIsThePowerOneOverTwoPointTwo) {
   EXPECT_LE(std::abs(encodeGamma(0.5) - 0.729740), kPrinted);
   for (double x = 1; x >= 0x1p-24; x /= 2)
     EXPECT_LE(std::abs(std::pow(encodeGamma(x), 2.2) / x - 1), 24 * std::log(2.0) * kHalfUlp) << x;
+}
+
+// The contract's 0 below 2^-126; there the power is 2^(-126 / 2.2), and the exponent's half ULP
+// moves it by ln 2^-126 / 2.2 of that, and of a double's rounding likewise.
+TEST(TonemapResolveModel, GammaBeginsAtTheSmallestNormalFloat) {
+  const double least = 0x1p-126, below = std::nextafter(least, 0.0);
+  const double first = std::pow(2, -126 / 2.2);
+  for (const auto& encode : {&encodeGamma, +[](double x) { return transfer(kGamma, x); }}) {
+    EXPECT_LE(std::abs(encode(least) / first - 1), 126 * std::log(2.0) / 2.2 * kHalfUlp);
+    EXPECT_EQ(encode(below), 0);
+  }
 }
 
 // sRGB is the lighter by 0.0058 at most, at 0.413, and the darker by 0.0335, at the x where the

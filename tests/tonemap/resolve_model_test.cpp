@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "harness/cases/kernel_case.h"
+#include "harness/cases/modelled.h"
 #include "harness/cases/random.h"
 #include "reference/bound/float.h"
 #include "reference/tonemap/resolve.h"
@@ -34,6 +34,25 @@ constexpr std::array kCurves = {kLinear, kReinhard, kNarkowicz, kHill};
 constexpr std::array kTransfers = {kNone, kGamma, kSrgb};
 
 double hillGrey(double x) { return hill(Vec3<double>(x)).x; }
+
+// What these tests are about (modelled.h). Curves and transfer functions are parts that have been
+// tested, so they stay as they are.
+Vec3<double> bloomAt(const Pixels& bloom, const uvec2& size, const uvec2& pixel) {
+  return modelled("bloomAt", [&]<class T>() { return tonemap::bloomAt<T>(bloom, size, pixel); });
+}
+// Each curve without a transfer function and each transfer function without a curve: that is every
+// operation. What both do together stays as it is.
+Vec4<double> resolve(const Resolve& push, const Pixels& hdr, const Pixels& bloom,
+                     const uvec2& pixel) {
+  constexpr std::array kCurveEntries = {"resolve", "resolve.reinhard", "resolve.narkowicz",
+                                        "resolve.hill"};
+  constexpr std::array kTransferEntries = {"resolve", "resolve.gamma", "resolve.srgb"};
+  const uint bent = push.curve <= kHill ? push.curve : kLinear;
+  const uint encoded = push.transfer <= kSrgb ? push.transfer : kNone;
+  if (bent != kLinear && encoded != kNone) return tonemap::resolve<double>(push, hdr, bloom, pixel);
+  return modelled(bent != kLinear ? kCurveEntries.at(bent) : kTransferEntries.at(encoded),
+                  [&]<class T>() { return tonemap::resolve<T>(push, hdr, bloom, pixel); });
+}
 
 // An image whose texel (x, y) is colour(x, y).
 struct Painted {
@@ -74,7 +93,7 @@ TEST(TonemapResolveModel, ConstantBloomStaysConstant) {
   const vec3 colour(0.1f, 3, 700);
   forEachPixel([&](const uvec2& bloom, const uvec2& size, const uvec2& at) {
     const Painted image(bloom, [&](uint, uint) { return colour; });
-    const Vec3<double> got = bloomAt<double>(image, size, at);
+    const Vec3<double> got = bloomAt(image, size, at);
     for (int c = 0; c < 3; ++c)
       EXPECT_LE(std::abs(got[static_cast<std::size_t>(c)] / colour[c] - 1), kDouble)
           << describe(bloom, size, at);
@@ -86,7 +105,7 @@ TEST(TonemapResolveModel, BloomOfTheImagesSizeIsTakenTexelByTexel) {
   const Painted image(size, [](uint x, uint y) { return vec3(x, y, 7 * y + x); });
   for (uint y = 0; y < size.y; ++y)
     for (uint x = 0; x < size.x; ++x) {
-      const Vec3<double> got = bloomAt<double>(image, size, {x, y});
+      const Vec3<double> got = bloomAt(image, size, {x, y});
       EXPECT_EQ(got.x, x);
       EXPECT_EQ(got.y, y);
       EXPECT_EQ(got.z, 7 * y + x);
@@ -104,7 +123,7 @@ TEST(TonemapResolveModel, BloomReproducesRampsAndHoldsTheEdge) {
   forEachPixel([&](const uvec2& bloom, const uvec2& size, const uvec2& at) {
     const Painted image(bloom, [](uint x, uint y) { return vec3(x, y, x * y); });
     const double u = ramp(at.x, size.x, bloom.x), v = ramp(at.y, size.y, bloom.y);
-    const Vec3<double> got = bloomAt<double>(image, size, at);
+    const Vec3<double> got = bloomAt(image, size, at);
     // Weights are exact to a rounding; values are up to bloom's size.
     const double rounding = kDouble * bloom.x * bloom.y;
     EXPECT_LE(std::abs(got.x - u), rounding) << describe(bloom, size, at);
@@ -119,7 +138,7 @@ TEST(TonemapResolveModel, HalfSizeBloomIsMixedOneToThree) {
   const std::array<double, 4> weight = {1, 0.75, 0.25, 0};
   for (uint y = 0; y < 4; ++y)
     for (uint x = 0; x < 4; ++x)
-      EXPECT_EQ(bloomAt<double>(image, {4, 4}, {x, y}).x, weight[x] * weight[y]) << x << " " << y;
+      EXPECT_EQ(bloomAt(image, {4, 4}, {x, y}).x, weight[x] * weight[y]) << x << " " << y;
 }
 
 TEST(TonemapResolveModel, WeightsOfBloomAreNotNegativeAndSumToOne) {
@@ -127,7 +146,7 @@ TEST(TonemapResolveModel, WeightsOfBloomAreNotNegativeAndSumToOne) {
     double sum = 0;
     for (uint i = 0; i < bloom.x * bloom.y; ++i) {
       const Painted impulse(bloom, [&](uint x, uint y) { return vec3(x + bloom.x * y == i); });
-      const double weight = bloomAt<double>(impulse, size, at).x;
+      const double weight = bloomAt(impulse, size, at).x;
       EXPECT_GE(weight, 0) << describe(bloom, size, at);
       sum += weight;
     }
@@ -145,7 +164,7 @@ Resolve settings(uint curve, uint transfer, float exposure = 1, float intensity 
 
 /// One pixel of one texel of bloom.
 Vec4<double> pixel(const Resolve& push, const vec3& hdr, const vec3& bloom = vec3(0)) {
-  return resolve<double>(push, Painted(hdr), Painted(bloom), uvec2(0));
+  return resolve(push, Painted(hdr), Painted(bloom), uvec2(0));
 }
 
 void expectSame(const Vec4<double>& got, const Vec4<double>& expected, const std::string& what) {
@@ -192,12 +211,76 @@ TEST(TonemapResolveModel, EveryPixelIsItsOwnTexelAndTheBloomAroundIt) {
     const Painted bloom(bloomSize, [](uint x, uint y) { return vec3(x, y, x + y) / 64.0f; });
     Resolve push = settings(kLinear, kNone, 2, 0.5f);
     push.size = size;
-    const Vec4<double> got = resolve<double>(push, hdr, bloom, at);
+    const Vec4<double> got = resolve(push, hdr, bloom, at);
     const double u = ramp(at.x, size.x, bloomSize.x), v = ramp(at.y, size.y, bloomSize.y);
     EXPECT_LE(std::abs(got.x - (2 * at.x + u) / 64), kDouble) << describe(bloomSize, size, at);
     EXPECT_LE(std::abs(got.y - (2 * at.y + v) / 64), kDouble) << describe(bloomSize, size, at);
     EXPECT_LE(std::abs(got.z - (u + v) / 64), kDouble) << describe(bloomSize, size, at);
   });
+}
+
+// What the contract says of a pixel, of parts that have tests of their own.
+Vec4<double> madeOfItsParts(const Resolve& push, const Painted& hdr, const Painted& bloom,
+                            const uvec2& at) {
+  const vec4& texel = hdr.texels[at.y * hdr.size.x + at.x];
+  const Vec3<double> around = tonemap::bloomAt<double>(bloom, push.size, at);
+  Vec3<double> exposed;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double scene = std::clamp(texel[static_cast<int>(c)], -kMaxScene, kMaxScene) +
+                         around[c] * push.bloomIntensity;
+    exposed[c] = std::clamp<double>(scene * push.exposure, 0, kMaxScene);
+  }
+  const Vec3<double> bent = curve(push.curve, exposed);
+  Vec4<double> shown(1);
+  for (std::size_t c = 0; c < 3; ++c)
+    shown[c] = transfer(push.transfer, std::clamp(bent[c], 0.0, 1.0));
+  return shown;
+}
+
+// From black over what shows every digit to beyond the largest scene, either sign.
+TEST(TonemapResolveModel, APixelIsMadeOfItsParts) {
+  Random random(caseSeed());
+  const auto any = [&](uint, uint) {
+    const auto light = [&] {
+      const float x =
+          random.chance(0.1) ? 0 : static_cast<float>(random.logUniform(0x1p-20, 0x1p2));
+      return x * (random.chance(0.2) ? -1.0f : 1.0f) * (random.chance(0.1) ? 0x1p31f : 1.0f);
+    };
+    return vec3(light(), light(), light());
+  };
+  const uvec2 size(7, 5), bloomSize(4, 3);
+  for (int i = 0; i < 20; ++i) {
+    const Painted hdr(size, any), bloom(bloomSize, any);
+    for (const uint which : kCurves)
+      for (const uint code : kTransfers) {
+        Resolve push = settings(which, code, 1.5f, 0.125f);
+        push.size = size;
+        for (uint y = 0; y < size.y; ++y)
+          for (uint x = 0; x < size.x; ++x) {
+            const Vec4<double> got = resolve(push, hdr, bloom, {x, y});
+            const Vec4<double> expected = madeOfItsParts(push, hdr, bloom, {x, y});
+            for (std::size_t c = 0; c < 4; ++c)
+              EXPECT_EQ(got[c], expected[c]) << "curve " << which << ", transfer " << code << ", "
+                                             << describe(bloomSize, size, {x, y});
+          }
+      }
+  }
+}
+
+// Where a transfer function has two pieces, each colour takes its own: at the last x of one and the
+// first of the other.
+TEST(TonemapResolveModel, EveryColourTakesItsOwnPieceOfTheTransferFunction) {
+  const float gamma = std::numeric_limits<float>::min(), srgb = 0.0031308f;
+  for (const auto& [code, at] : {std::pair{kGamma, gamma}, std::pair{kSrgb, srgb}})
+    for (const float x : {std::nextafter(at, 0.0f), at, std::nextafter(at, 1.0f)})
+      for (int c = 0; c < 3; ++c) {
+        vec3 colour(0.5f);
+        colour[c] = x;
+        const Vec4<double> got = pixel(settings(kLinear, code), colour);
+        for (int k = 0; k < 3; ++k)
+          EXPECT_EQ(got[static_cast<std::size_t>(k)], transfer<double>(code, double{colour[k]}))
+              << code << ", component " << k << " of " << x;
+      }
 }
 
 // 2 bends to more than 1 without a curve, and to less with any: saturation stands behind the curve.
@@ -293,14 +376,13 @@ TEST(TonemapResolveModel, ABadTexelOfBloomDoesNotSpreadAsNan) {
     return Painted({2, 2}, [=](uint x, uint y) { return vec3(x + y == 0 ? corner : 1.0f); });
   };
   for (uint x = 0; x < 4; ++x)
-    EXPECT_EQ(bloomAt<double>(image(kQuiet), {4, 4}, {x, 1}).x,
-              bloomAt<double>(image(0), {4, 4}, {x, 1}).x);
+    EXPECT_EQ(bloomAt(image(kQuiet), {4, 4}, {x, 1}).x, bloomAt(image(0), {4, 4}, {x, 1}).x);
 }
 
 TEST(TonemapResolveModel, AlphaIsNotLookedAt) {
   const std::vector<vec4> hdr = {{0.1f, 0.2f, 0.3f, kQuiet}}, bloom = {{1, 2, 3, kInf}};
   const Resolve push = settings(kHill, kSrgb, 1, 0.5f);
-  expectSame(resolve<double>(push, {uvec2(1), hdr}, {uvec2(1), bloom}, uvec2(0)),
+  expectSame(resolve(push, {uvec2(1), hdr}, {uvec2(1), bloom}, uvec2(0)),
              pixel(push, vec3(0.1f, 0.2f, 0.3f), vec3(1, 2, 3)), "alpha NaN and Inf");
 }
 
@@ -326,7 +408,7 @@ void forEachBound(uint curve, uint transfer, int stops, const F& f) {
     const Painted hdr(size, any), bloom({4, 3}, any);
     Resolve push = settings(curve, transfer, std::exp2(static_cast<float>(stops)), 0.0625f);
     push.size = size;
-    f(resolve<double>(push, hdr, bloom, at), resolve<Bounded>(push, hdr, bloom, at));
+    f(tonemap::resolve<double>(push, hdr, bloom, at), resolve<Bounded>(push, hdr, bloom, at));
   }
 }
 
