@@ -28,11 +28,16 @@ double chiSquareTest(const std::vector<double>& observed, const std::vector<doub
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order,
                            [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });
-  double statistic = 0, bins = 0, pooledObserved = 0, pooledExpected = 0;
+  double statistic = 0, bins = 0;
+  double pooledObserved = 0, pooledExpected = 0, left = 0;
+  for (const std::size_t bin : order) left += expected[bin];
   for (const std::size_t bin : order) {
     pooledObserved += observed[bin];
     pooledExpected += expected[bin];
-    if (pooledExpected < kLeastExpected) continue;
+    left -= expected[bin];
+    // What could not make a pool of its own any more joins this one.
+    const bool last = bin == order.back();
+    if (!last && (pooledExpected < kLeastExpected || left < kLeastExpected)) continue;
     statistic +=
         (pooledObserved - pooledExpected) * (pooledObserved - pooledExpected) / pooledExpected;
     bins += 1;
