@@ -66,7 +66,8 @@ int listKills(const ListOptions& options) {
   std::vector<Answer> answers;
   std::vector<CaseName> cases;
   for (const std::string& kernel : mutatedKernels(options.stages)) {
-    answers.push_back(mutation.ask({.kernel = kernel, .sought = 2}));
+    for (const bool ofModel : {false, true})
+      answers.push_back(mutation.ask({.kernel = kernel, .ofModel = ofModel, .sought = 2}));
     for (CaseName& c : selectCases({.stages = {kernel}})) cases.push_back(std::move(c));
   }
   const std::vector<Worth> all = worthOf(cases, answers);

@@ -32,6 +32,10 @@ struct Outcome {
   std::vector<std::string> problems{};  ///< each makes the command fail
 };
 
+constexpr std::string_view kModel = " model";  // ends the name of a model that is mutated
+
+bool isModel(const std::string& name) { return name.ends_with(kModel); }
+
 std::string stageOf(const std::string& kernel) { return kernel.substr(0, kernel.find('/')); }
 
 fs::path recordFile(const fs::path& root, const std::string& kernel) {
@@ -68,7 +72,8 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
     outcome.problems.push_back(fmt::format(
         "{}: {} of its mutants survive and nobody has explained why", a.kernel, unexplained));
   if (!whole) return outcome;
-  if (outcome.score.value() < policy["mutationScore"])
+  // Most of what survives in a model cannot be seen by anybody: a clamp behind a clamp.
+  if (!isModel(a.kernel) && outcome.score.value() < policy["mutationScore"])
     outcome.problems.push_back(fmt::format("{}: its score is {:.3f}, below the policy's {:g}",
                                            a.kernel, outcome.score.value(),
                                            policy["mutationScore"]));
@@ -86,16 +91,20 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
 
 std::string describe(const Survivor& s) {
   const Mutant& m = *s.mutant;
+  const std::string why =
+      s.explanation ? "explained: " + s.explanation->reason : "NOT EXPLAINED";
+  if (m.place.file.empty()) return fmt::format("  {}\n    {}\n", m.id, why);
   return fmt::format("  kernels/{}:{}  {}\n    {}\n    {}\n    {}\n", m.place.file, m.place.line,
-                     m.id, m.place.text, m.change,
-                     s.explanation ? "explained: " + s.explanation->reason : "NOT EXPLAINED");
+                     m.id, m.place.text, m.change, why);
 }
 
+/// Of a model only those that nobody has explained: the rest would fill pages.
 void printSurvivors(Terminal& terminal, const Outcome& outcome) {
-  if (outcome.survivors.empty()) return;
-  std::string text = fmt::format("survivors of {}\n", outcome.answer.kernel);
-  for (const Survivor& s : outcome.survivors) text += describe(s);
-  terminal.print(text);
+  std::string text;
+  for (const Survivor& s : outcome.survivors)
+    if (s.explanation == nullptr || !isModel(outcome.answer.kernel)) text += describe(s);
+  if (!text.empty())
+    terminal.print(fmt::format("survivors of {}\n{}", outcome.answer.kernel, text));
 }
 
 std::string outcomeTable(const std::vector<Outcome>& outcomes, const Terminal& terminal) {
@@ -165,6 +174,22 @@ std::string contentOf(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+/// What the README says of a kernel: its score, and its model's.
+std::string cellOf(const MutantRecords& records, const std::string& kernel) {
+  std::string text;
+  if (const auto r = records.find(kernel); r != records.end() && r->second.score)
+    text = scoreText(*r->second.score);
+  const auto model = records.find(kernel + std::string(kModel));
+  if (model != records.end() && model->second.score)
+    text += fmt::format("; model {} of {}", model->second.score->killed,
+                        model->second.score->mutants);
+  return text;
+}
+
+std::string kernelOf(const std::string& name) {
+  return isModel(name) ? name.substr(0, name.size() - kModel.size()) : name;
+}
+
 /// The scores of this run on record, in tests/mutants/ and in the README's table of stages.
 void bless(const std::vector<Outcome>& outcomes, const fs::path& root) {
   std::map<std::string, std::string> cells;
@@ -173,29 +198,31 @@ void bless(const std::vector<Outcome>& outcomes, const fs::path& root) {
     MutantRecords records = loadMutantRecords(file);
     records[o.answer.kernel].score = o.score;
     saveMutantRecords(file, records);
-    cells[o.answer.kernel] = scoreText(o.score);
+    cells[kernelOf(o.answer.kernel)] = cellOf(records, kernelOf(o.answer.kernel));
   }
   const fs::path readme = root / "README.md";
   writeText(readme, withScores(contentOf(readme), cells));
 }
 
 /// What is on record has to be true, as far as this run can tell.
-void compareWithRecord(Outcome& outcome, const MutantRecord& record, const fs::path& root,
+void compareWithRecord(Outcome& outcome, const MutantRecords& records, const fs::path& root,
                        bool sampled) {
-  const std::string& kernel = outcome.answer.kernel;
+  const std::string& name = outcome.answer.kernel;
   const char* remedy = "`gnomon mutate --bless` writes it anew";
-  if (!record.score) {
-    outcome.problems.push_back(fmt::format("{} has no score on record: {}", kernel, remedy));
+  const auto record = records.find(name);
+  if (record == records.end() || !record->second.score) {
+    outcome.problems.push_back(fmt::format("{} has no score on record: {}", name, remedy));
     return;
   }
-  if (!sampled && *record.score != outcome.score)
-    outcome.problems.push_back(fmt::format("{}: the score on record is {}, this one {}: {}", kernel,
-                                           scoreText(*record.score), scoreText(outcome.score),
-                                           remedy));
+  if (!sampled && *record->second.score != outcome.score)
+    outcome.problems.push_back(fmt::format("{}: the score on record is {}, this one {}: {}", name,
+                                           scoreText(*record->second.score),
+                                           scoreText(outcome.score), remedy));
   const std::string readme = contentOf(root / "README.md");
-  if (withScores(readme, {{kernel, scoreText(*record.score)}}) != readme)
-    outcome.problems.push_back(fmt::format("{}: README.md does not give the score on record, {}: {}",
-                                           kernel, scoreText(*record.score), remedy));
+  const std::string kernel = kernelOf(name), cell = cellOf(records, kernel);
+  if (withScores(readme, {{kernel, cell}}) != readme)
+    outcome.problems.push_back(
+        fmt::format("{}: README.md does not say '{}' of it: {}", kernel, cell, remedy));
 }
 
 }  // namespace
@@ -212,18 +239,24 @@ int mutate(const MutateOptions& options) {
   Terminal& terminal = mutation.terminal();
 
   std::vector<Outcome> outcomes;
-  for (const std::string& kernel : kernels) {
-    const bool ours = !options.session.kernels.contains(kernel);
-    const MutantRecord record =
-        ours ? loadMutantRecords(recordFile(root, kernel))[kernel] : MutantRecord{};
-    Answer answer =
-        mutation.ask({.kernel = kernel,
-                      .operators = {options.operators.begin(), options.operators.end()},
-                      .sample = options.sample});
+  const auto add = [&](const Question& question) {
+    const bool ours = !options.session.kernels.contains(question.kernel);
+    MutantRecords records;
+    if (ours) records = loadMutantRecords(recordFile(root, question.kernel));
+    Answer answer = mutation.ask(question);
+    const MutantRecord record = records[answer.kernel];
     outcomes.push_back(outcomeOf(std::move(answer), record, mutation.policy(), whole));
     printSurvivors(terminal, outcomes.back());
     if (ours && !options.bless && options.operators.empty())
-      compareWithRecord(outcomes.back(), record, root, options.sample.has_value());
+      compareWithRecord(outcomes.back(), records, root, options.sample.has_value());
+  };
+  for (const std::string& kernel : kernels) {
+    add({.kernel = kernel,
+         .operators = {options.operators.begin(), options.operators.end()},
+         .sample = options.sample});
+    // Operators are those of kernels, and a kernel of the user's has our model.
+    if (options.operators.empty() && !options.session.kernels.contains(kernel))
+      add({.kernel = kernel, .sample = options.sample, .ofModel = true});
   }
   if (options.bless) bless(outcomes, root);
   if (!options.json.empty())

@@ -140,6 +140,7 @@ std::string toJson(const WorkerTask& task) {
                {"cases", task.cases},
                {"mutated", task.mutated},
                {"mutants", task.mutants},
+               {"models", task.models},
                {"kills", task.kills},
                {"errors", task.errors ? errorsJson(*task.errors) : Json(nullptr)}});
 }
@@ -158,6 +159,7 @@ WorkerTask workerTask(std::string_view json) try {
                   .cases = j.at("cases"),
                   .mutated = j.at("mutated"),
                   .mutants = j.at("mutants"),
+                  .models = j.at("models"),
                   .kills = j.at("kills")};
   if (const auto seconds = optional<long>(j.at("timeout")))
     task.session.timeout = std::chrono::seconds(*seconds);

@@ -18,6 +18,7 @@ struct WorkerTask {
   std::optional<DeviceErrors> errors{};  ///< of the device; none: as a file says
   std::string mutated{};                 ///< the kernel whose mutants the cases are to tell; or none
   std::vector<std::string> mutants{};    ///< by id (harness/mutate/mutants.h): one after another
+  bool models = false;  ///< the mutants are of that kernel's model; none: to list them only
   unsigned kills = 1;                    ///< cases that have to fail before the next mutant's turn
 };
 

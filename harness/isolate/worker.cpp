@@ -16,6 +16,7 @@
 #include "harness/cases/runner.h"
 #include "harness/error.h"
 #include "harness/isolate/fault.h"
+#include "harness/mutate/models.h"
 #include "harness/mutate/mutants.h"
 
 namespace gnomon {
@@ -31,6 +32,7 @@ constexpr std::string_view kFurther = "@further ";
 constexpr std::string_view kEnded = "@ended ";
 constexpr std::string_view kMutant = "@mutant ";
 constexpr std::string_view kTold = "@told ";
+constexpr std::string_view kPlan = "@plan ";
 
 constexpr int kUsageStatus = 2, kDeviceStatus = 3;  // of the command
 
@@ -133,6 +135,17 @@ void judgeMutants(Session& session, const WorkerTask& task, const std::vector<Ca
   }
 }
 
+void judgeModels(Session& session, const WorkerTask& task) {
+  const ModelPlan plan = planModel(session, task.mutated);
+  if (task.mutants.empty()) return say(kPlan, toJson(plan.mutants));
+  for (const std::string& id : task.mutants) {
+    const auto m = std::ranges::find(plan.mutants, id, &ModelMutant::id);
+    if (m == plan.mutants.end()) throw UsageError("there is no mutant '" + id + "' of the model");
+    say(kMutant, id);
+    say(kTold, toJson(judgeMutant(session, plan, *m, task.kills)));
+  }
+}
+
 }  // namespace
 
 void serve(const WorkerTask& task) {
@@ -140,6 +153,7 @@ void serve(const WorkerTask& task) {
   const std::vector<CaseName> cases = namedCases(task.cases);
   Session session(task.session);
   if (task.errors) session.know(*task.errors);
+  if (task.models) return judgeModels(session, task);
   if (cases.empty()) return prepareHere(session);
   session.onProgress = [] { say(kFurther, ""); };
   const Observer observer{
@@ -165,7 +179,8 @@ class Listener {
     if (take(line, kFurther)) startAgain();
     if (take(line, kEnded)) endCase(caseRecord(line));
     if (take(line, kMutant)) beginMutant(std::string(line));
-    if (take(line, kTold)) endMutant();
+    if (take(line, kTold)) endMutant(std::string(line));
+    if (take(line, kPlan)) report.plan = line;
   } catch (const UsageError&) {  // it lost its mind: what it does not say well, it has not said
   }
 
@@ -200,9 +215,9 @@ class Listener {
     if (options.mutant) options.mutant(report.mutant);
   }
 
-  void endMutant() {
+  void endMutant(const std::string& outcome) {
     startAgain();
-    if (options.told) options.told(report.mutant);
+    if (options.told) options.told(report.mutant, outcome);
     report.mutant.clear();
   }
 

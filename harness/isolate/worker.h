@@ -31,7 +31,8 @@ struct WorkerOptions {
   std::function<void(const std::string& name)> begun{};  ///< told of every case as it begins
   std::function<void(CaseRecord)> ended{};               ///< ... and as it ends
   std::function<void(const std::string& id)> mutant{};   ///< told of every mutant as it begins
-  std::function<void(const std::string& id)> told{};     ///< ... and when no case is left for it
+  /// ... and when no case is left for it; with what has become of a model's.
+  std::function<void(const std::string& id, const std::string& outcome)> told{};
 };
 
 /// What became of a task.
@@ -40,6 +41,7 @@ struct WorkerReport {
   std::string running{};                     ///< the case that had begun but not ended; or none
   std::string mutant{};                      ///< the same of a mutant
   std::optional<Preparation> preparation{};  ///< of a task without cases
+  std::string plan{};                        ///< a model's mutants, as modelMutants() reads them
   ProcessResult process{};
 
   /// Why it ended before its task did, in words: "was killed by signal 11 (Segmentation fault)",

@@ -153,7 +153,7 @@ class Campaign {
                   const std::lock_guard lock(mutex);
                   if (observer.begun) observer.begun(mutants[chunk.mutants.front()]);
                 },
-            .told = [this, &chunk](const std::string&) { settle(chunk); }};
+            .told = [this, &chunk](const std::string&, const std::string&) { settle(chunk); }};
   }
 
   void settle(Chunk& chunk) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 #include <random>
 
 #include <fmt/format.h>
@@ -12,6 +11,7 @@
 #include "harness/cases/cache.h"
 #include "harness/cases/hash.h"
 #include "harness/error.h"
+#include "harness/mutate/model_campaign.h"
 #include "harness/mutate/operators.h"
 
 namespace gnomon {
@@ -50,7 +50,8 @@ std::chrono::seconds patience(const std::vector<Witness>& witnesses) {
 std::filesystem::path cacheFile(const Preparation& prepared, std::string kernel) {
   const std::filesystem::path folder = cacheFolder();
   if (folder.empty()) return {};
-  std::ranges::replace(kernel, '/', '-');
+  for (char& c : kernel)
+    if (c == '/' || c == ' ') c = '-';
   return folder / "mutants" / deviceKey(prepared.gpu) / (kernel + ".jsonl");
 }
 
@@ -72,13 +73,15 @@ class Inquiry {
   Answer ask() {
     const auto begin = Clock::now();
     refuseUnknownOperators(question.operators);
-    answer.kernel = question.kernel;
+    answer.kernel = question.kernel + (question.ofModel ? " model" : "");
     tell("finding mutants");
-    makeMutants();
+    question.ofModel ? listModel() : makeMutants();
+    if (question.sample) keepSample(answer.mutants, *question.sample, schedule.session.seed);
     const auto about = circumstances(schedule, prepared, question.kernel);
-    FateCache cache(about ? cacheFile(prepared, question.kernel) : std::filesystem::path());
+    FateCache cache(about ? cacheFile(prepared, answer.kernel) : std::filesystem::path());
     std::vector<Mutant> open = takeKnown(cache, about.value_or(0));
-    if (!open.empty()) judge(open, cache, about.value_or(0));
+    if (!open.empty() && question.ofModel) judgeModel(open, cache, about.value_or(0));
+    if (!open.empty() && !question.ofModel) judge(open, cache, about.value_or(0));
     if (!question.sample && question.operators.empty()) cache.keepOnly(keys);
     answer.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return std::move(answer);
@@ -92,9 +95,16 @@ class Inquiry {
     answer.equivalent = std::move(found.equivalent);
     answer.invalid = found.invalid;
     answer.duplicates = found.duplicates;
-    if (!question.sample) return;
-    keepSample(answer.mutants, *question.sample, schedule.session.seed);
-    answer.equivalent.clear();
+    if (question.sample) answer.equivalent.clear();
+  }
+
+  void listModel() {
+    for (const NamedModelMutant& m : listModelMutants(schedule, question.kernel))
+      answer.mutants.push_back({.id = m.id,
+                                .operatorName = m.kind,
+                                .place = {.function = m.entry, .text = m.entry},
+                                .change = m.kind,
+                                .hash = hashOf(m.id)});
   }
 
   static std::uint64_t keyOf(const Mutant& m, std::uint64_t about) {
@@ -129,15 +139,26 @@ class Inquiry {
     judgeMutants({session, schedule.policy, schedule.jobs, schedule.errors}, prepared.gpu,
                  question.kernel, open, witnesses, question.sought,
                  {.begun = [this](const Mutant& m) { tell(m.id); },
-                  .told =
-                      [&](const Mutant& m, const Fate& fate) {
-                        const auto at = std::ranges::find(answer.mutants, m.id, &Mutant::id);
-                        answer.fates[static_cast<std::size_t>(at - answer.mutants.begin())] = fate;
-                        cache.keep(keyOf(m, about), fate);
-                        ++known;
-                        killed += !fate.survived();
-                        tell(m.id);
-                      }});
+                  .told = [&](const Mutant& m,
+                              const Fate& fate) { settle(m.id, fate, cache, about); }});
+  }
+
+  void judgeModel(const std::vector<Mutant>& open, FateCache& cache, std::uint64_t about) {
+    std::vector<std::string> ids;
+    for (const Mutant& m : open) ids.push_back(m.id);
+    judgeModelMutants(schedule, question.kernel, ids, question.sought,
+                      [&](const std::string& id, const Fate& fate) {
+                        settle(id, fate, cache, about);
+                      });
+  }
+
+  void settle(const std::string& id, const Fate& fate, FateCache& cache, std::uint64_t about) {
+    const auto at = std::ranges::find(answer.mutants, id, &Mutant::id);
+    answer.fates[static_cast<std::size_t>(at - answer.mutants.begin())] = fate;
+    cache.keep(keyOf(*at, about), fate);
+    ++known;
+    killed += !fate.survived();
+    tell(id);
   }
 
   void tell(const std::string& now) const {

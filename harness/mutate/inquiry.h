@@ -18,13 +18,14 @@ struct Question {
   std::string kernel{};                ///< "brdf/evaluate"
   std::set<std::string> operators{};   ///< by name; empty: all
   std::optional<std::size_t> sample{};  ///< so many of the mutants, chosen by the session's seed
+  bool ofModel = false;                ///< of the kernel's model, whose operators are its own
   unsigned sought = 1;                 ///< kills of each: 2 tells whether a case kills alone
 };
 
 /// What is answered.
 struct Answer {
-  std::string kernel{};
-  std::vector<Mutant> mutants{};     ///< that were judged
+  std::string kernel{};              ///< "brdf/evaluate", "brdf/evaluate model"
+  std::vector<Mutant> mutants{};     ///< that were judged; of a model, without a module
   std::vector<Fate> fates{};         ///< of each
   std::vector<Mutant> equivalent{};  ///< that need not be
   std::size_t invalid = 0, duplicates = 0;
@@ -45,8 +46,8 @@ struct InquiryObserver {
 /// UsageError where one does not exist or none is left.
 std::vector<std::string> mutatedKernels(const std::vector<std::string>& stages);
 
-/// Throws CaseFailure where the kernel's own cases fail, UsageError, DeviceError. Without a compiler
-/// of its own it is as quick as the cases: fates are kept in the user's cache.
+/// Finds out what earlier runs have not: fates are kept in the user's cache. Throws CaseFailure where
+/// cases fail on the kernel, or the model, as it is; UsageError, DeviceError.
 Answer inquire(const Schedule& schedule, const Preparation& prepared, const Question& question,
                const InquiryObserver& observer);
 

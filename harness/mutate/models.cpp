@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -12,6 +11,8 @@
 
 namespace gnomon {
 namespace {
+
+using Json = nlohmann::json;
 
 std::string firstLine(const CaseRecord& record) {
   if (record.messages.empty()) return {};
@@ -72,21 +73,31 @@ ModelOutcome judgeMutant(Session& session, const ModelPlan& plan, const ModelMut
   return outcome;
 }
 
-std::map<std::string, std::string> explainedModelMutants(const std::filesystem::path& root,
-                                                         const std::string& kernel) {
-  const std::filesystem::path file = root / "tests/mutants/models.json";
-  std::map<std::string, std::string> reasons;
-  if (!std::filesystem::exists(file)) return reasons;
-  try {
-    std::ifstream in(file);
-    const nlohmann::json all = nlohmann::json::parse(in);
-    if (!all.contains(kernel)) return reasons;
-    for (const nlohmann::json& explained : all.at(kernel))
-      reasons[explained.at("id").get<std::string>()] = explained.at("reason").get<std::string>();
-  } catch (const nlohmann::json::exception& error) {
-    throw UsageError(fmt::format("{}: {}", file.string(), error.what()));
-  }
-  return reasons;
+std::string toJson(const std::vector<ModelMutant>& mutants) {
+  Json list = Json::array();
+  for (const ModelMutant& m : mutants)
+    list.push_back({m.id(), m.entry, std::string(nameOf(m.operation.kind))});
+  return list.dump();
+}
+
+std::string toJson(const ModelOutcome& outcome) {
+  return Json{{"killers", outcome.killers}, {"message", outcome.message}}.dump(
+      -1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<NamedModelMutant> modelMutants(std::string_view json) try {
+  std::vector<NamedModelMutant> all;
+  for (const Json& m : Json::parse(json)) all.push_back({m.at(0), m.at(1), m.at(2)});
+  return all;
+} catch (const Json::exception& error) {
+  throw UsageError(fmt::format("this is no list of a model's mutants: {}", error.what()));
+}
+
+ModelOutcome modelOutcome(std::string_view json) try {
+  const Json j = Json::parse(json);
+  return {.killers = j.at("killers"), .message = j.at("message")};
+} catch (const Json::exception& error) {
+  throw UsageError(fmt::format("this is no outcome of a model's mutant: {}", error.what()));
 }
 
 }  // namespace gnomon

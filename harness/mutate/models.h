@@ -3,10 +3,9 @@
 // hold. No GPU.
 #pragma once
 
-#include <filesystem>
-#include <map>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/cases/modelled.h"
@@ -42,9 +41,16 @@ struct ModelOutcome {
 ModelOutcome judgeMutant(Session& session, const ModelPlan& plan, const ModelMutant& mutant,
                          std::size_t sought = 1);
 
-/// Why mutants of a kernel's model cannot be told from it, by id: tests/mutants/models.json. Empty
-/// where there is no such file. Throws UsageError where it cannot be read.
-std::map<std::string, std::string> explainedModelMutants(const std::filesystem::path& root,
-                                                         const std::string& kernel);
+/// How a worker tells its parent: ids with what they alter, and an outcome. The readers throw
+/// UsageError for any other text.
+std::string toJson(const std::vector<ModelMutant>& mutants);
+std::string toJson(const ModelOutcome& outcome);
+
+/// A mutant as a person and a cache know it.
+struct NamedModelMutant {
+  std::string id{}, entry{}, kind{};
+};
+std::vector<NamedModelMutant> modelMutants(std::string_view json);
+ModelOutcome modelOutcome(std::string_view json);
 
 }  // namespace gnomon

@@ -219,6 +219,7 @@ inline Altered select(const AlteredDecision& condition, const Altered& a,
 }
 
 inline Altered named(const Altered& x, const char*) noexcept { return x; }
+inline Altered reported(const Altered& x, const char*) noexcept { return x; }
 inline Altered alsoAs(const Altered& ours, const Altered&) noexcept { return ours; }
 
 Altered min(const Altered& a, const Altered& b) noexcept;
