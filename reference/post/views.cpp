@@ -40,7 +40,7 @@ Cascade<T> cascadeAt(const T& distance, const Views& push) {
 template <class T>
 Vec3<T> cascadeView(const T& distance, const Vec3<T>& albedo, const Views& push) {
   const Cascade<T> cascade = cascadeAt(distance, push);
-  reported(T(cascade.number), "cascade");
+  reported(input<T>(static_cast<float>(cascade.number)), "cascade");
   const vec3 tint = kCascadeTint * cascade.colour;  // a float product, as a compiler folds it
   const Vec3<T> shown = reported(input<T>(tint) + T(kCascadeDim) * albedo, "tinted");
   if (cascade.last) return shown;

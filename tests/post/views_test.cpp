@@ -194,6 +194,25 @@ TEST_F(PostViews, BadInputCountsAsTheContractSays) {
   }
 }
 
+/// A near plane for which near * far / near, rounded to float, is beyond a far plane of 250. Their
+/// product is a little above 16, where it is rounded by as much, relative to itself, as it can be.
+float nearThatRoundsUp(float far) {
+  for (float near = 0.0645f;; near = std::nextafter(near, 1.0f)) {
+    const float product = near * far;
+    if (product / near > far) return near;
+  }
+}
+
+// Next to the far plane a distance may be rounded beyond it, and beyond the last split with it.
+TEST_F(PostViews, WhatRoundsBeyondTheFarPlaneIsInTheLastCascade) {
+  Scene scene = generatedScene({1, 1}, caseSeed());
+  scene.push.mode = kCascades;
+  scene.push.near = nearThatRoundsUp(scene.push.far);
+  scene.albedo.texels = {vec4(0.5f)};
+  scene.depth.texels = {vec4(1e-30f)};  // not the sky, but nothing beside the near plane
+  expectInsideTheBound(scene);
+}
+
 // Green, blue, yellow, red over black albedo, read off the picture itself.
 TEST_F(PostViews, CascadesHaveTheirColours) {
   const uvec2 size(4, 1);

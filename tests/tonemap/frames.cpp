@@ -98,7 +98,7 @@ Frame thresholds() {
   constexpr float kSmallest = std::numeric_limits<float>::min(), kSrgbEnd = 0.0031308f;
   std::vector<float> values;
   for (const float x : {kSmallest, kSrgbEnd, 1.0f})
-    for (const float scale : {0.99995f, 1.0f, 1.00005f})
+    for (const float scale : {0.99991f, 1.0f, 1.00009f})
       for (const float towards : {0.0f, 2.0f, scale * x}) {
         const float value = std::nextafter(scale * x, towards);
         if (value >= kSmallest) values.push_back(value);  // a denormal may be flushed: ambiguous
