@@ -33,7 +33,7 @@ Frame highlights(const uvec2& size, std::uint64_t seed);
 Frame degenerate();
 
 /// Grey at the ends of the transfer functions' pieces, at their neighbours in float, and 9e-5 of
-/// them away, where sRGB's pieces differ by more than a power errs: no bloom, exposure 1.
+/// them away, as it stands: no bloom, exposure 1.
 Frame thresholds();
 
 /// A picture of an OpenEXR file's R, G and B, alpha 1.
