@@ -39,6 +39,14 @@ void KernelCase::skipUnlessEveryOutputIsGiven() {
   GTEST_SKIP() << fmt::format("the kernel does not give {}", fmt::join(interface.unmapped, ", "));
 }
 
+void KernelCase::skipUnlessTheProbesAreOurs() {
+  if (IsSkipped()) return;
+  const SessionOptions& options = Session::current().options();
+  if (options.kernels.contains(kernelName))
+    GTEST_SKIP() << "another arrangement may have other intermediates than ours";
+  if (!options.probes) GTEST_SKIP() << "nobody asks for probes";
+}
+
 bool KernelCase::applies(std::span<const std::byte> push) {
   const Subject& subject = Session::current().subject(kernelName);
   const bool all = std::ranges::all_of(subject.interface().fixed, [&](const auto& fixed) {
@@ -79,6 +87,21 @@ Observation KernelCase::run(Stimulus stimulus) {
   if (session.options().probes && !subject.record().probes.fields.empty())
     seen.stimulus = std::make_shared<const KeptStimulus>(stimulus);
   return seen;
+}
+
+void KernelCase::expectEveryProbeInside(const Observation& seen, const Expectation& expected) {
+  const Bounds& by = Session::current().bounds();
+  constexpr std::size_t kShown = 3;  // more of the same say nothing new
+  for (const std::string& divergence :
+       divergences(kernelName, seen, expected, by.device ? *by.device : by.spec, kShown))
+    ADD_FAILURE() << divergence;
+  checked(expected.elements);
+}
+
+void KernelCase::expectTheModelNamesEveryProbe(std::span<const Expectation> expected) {
+  const Struct& probes = Session::current().subject(kernelName).record().probes;
+  for (const std::string& disagreement : disagreements(probes, expected))
+    ADD_FAILURE() << disagreement;
 }
 
 void KernelCase::expectClean(const Observation& seen) {

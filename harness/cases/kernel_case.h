@@ -35,6 +35,10 @@ class KernelCase : public testing::Test {
   /// Skips a case that reads outputs directly where a foreign kernel does not give all of them.
   void skipUnlessEveryOutputIsGiven();
 
+  /// Skips a case that judges the kernel's probes unless it is the project's own: another
+  /// arrangement is as good as ours, and its intermediates are where it has them.
+  void skipUnlessTheProbesAreOurs();
+
   /// Whether the kernel takes these push constants: a foreign one may stand for one value of some,
   /// as its adapter's constants say. A case goes on to the next where it does not.
   bool applies(std::span<const std::byte> push);
@@ -53,6 +57,14 @@ class KernelCase : public testing::Test {
   /// Runs the kernel under every check of hygiene; the findings go to the verdict. Where it does
   /// not apply, nothing runs, and expectConforms says nothing of what is returned.
   Observation run(Stimulus stimulus);
+
+  /// Fails the case where an intermediate that the kernel names is outside what the model records
+  /// of it, under the rules that decide.
+  void expectEveryProbeInside(const Observation& seen, const Expectation& expected);
+
+  /// Fails the case unless the contract and the model of these expectations, together, name the
+  /// same intermediates: a name that only one of them knows is never judged.
+  void expectTheModelNamesEveryProbe(std::span<const Expectation> expected);
 
   /// For laws, which judge without a verdict: fails the case with what hygiene found.
   void expectClean(const Observation& seen);

@@ -51,6 +51,25 @@ std::vector<std::string> judgedBefore(const std::vector<ProbedScalar>& element,
   return names;
 }
 
+/// In lines that a terminal shows whole, broken at spaces; ends in a line's end.
+std::string inLines(const std::string& text) {
+  constexpr std::size_t kColumns = 100;
+  std::string lines;
+  std::size_t column = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    if (column > 0) {
+      const bool fits = column + 1 + (end - begin) <= kColumns;
+      lines += fits ? ' ' : '\n';
+      column = fits ? column + 1 : 0;
+    }
+    lines.append(text, begin, end - begin);
+    column += end - begin;
+    begin = end + 1;
+  }
+  return lines + '\n';
+}
+
 std::string number(double x) { return fmt::format("{:.9g}", x); }
 
 /// An image whose rows a foreign kernel counts from below has its probes there too.
@@ -120,9 +139,9 @@ std::string firstDivergenceOrThrow(const std::string& kernel, const Observation&
   std::string text = describeDivergence(runs.at(element, recorded(expected, rules, element)),
                                         placeIn(expected, element));
   if (!runs.repeats(seen, element))
-    text +=
-        "(With probes its results differ from those that were judged: what the compiler makes\n"
-        "of it depends on them.)\n";
+    text += inLines(
+        "(With probes its results differ from those that were judged: what the compiler makes of "
+        "it depends on them.)");
   return text;
 }
 
@@ -155,27 +174,23 @@ std::string describeDivergence(const std::vector<ProbedScalar>& element, const s
   const std::vector<std::string> before = judgedBefore(element, first);
   if (first == nullptr && before.empty()) {
     const bool any = std::ranges::any_of(element, &ProbedScalar::written);
-    return fmt::format("Of {} the model ends before any intermediate that has a name{}.\n", place,
-                       any ? "; the kernel goes on" : "");
+    return inLines(fmt::format("Of {} the model ends before any intermediate that has a name{}.",
+                               place, any ? "; the kernel goes on" : ""));
   }
   if (first == nullptr)
-    return fmt::format(
-        "At {} every intermediate that the kernel names is inside: the fault comes after them\n"
-        "({}).\n",
-        place, fmt::join(before, ", "));
-  std::string text =
-      first->written
-          ? fmt::format(
-                "At {} it first diverges at {}: got {} (strict twin), allowed [{}, {}], "
-                "model {}",
-                place, first->name, number(first->got), number(first->allowed->lo),
-                number(first->allowed->hi), number(first->allowed->value))
-          : fmt::format("At {} it first diverges at {}: never computed, allowed [{}, {}]", place,
-                        first->name, number(first->allowed->lo), number(first->allowed->hi));
+    return inLines(
+        fmt::format("At {} every intermediate that the kernel names is inside: the fault comes "
+                    "after them ({}).",
+                    place, fmt::join(before, ", ")));
+  std::string text = fmt::format("At {} it first diverges at {}: ", place, first->name);
+  text += first->written ? fmt::format("got {} (strict twin), ", number(first->got))
+                         : std::string("never computed, ");
+  text += fmt::format("allowed [{}, {}]", number(first->allowed->lo), number(first->allowed->hi));
+  if (first->written) text += fmt::format(", model {}", number(first->allowed->value));
   if (!before.empty())
-    text += fmt::format(";\n{} before it {} inside ({})", before.size() == 1 ? "the one" : "all",
+    text += fmt::format("; {} before it {} inside ({})", before.size() == 1 ? "the one" : "all",
                         before.size() == 1 ? "is" : "are", fmt::join(before, ", "));
-  return text + ".\n";
+  return inLines(text + ".");
 }
 
 Recording::Names recorded(const Expectation& expected, const Rules& rules, std::size_t element) {
@@ -220,8 +235,8 @@ std::string firstDivergence(const std::string& kernel, const Observation& seen,
         kernel, seen, expected, deciding.device ? *deciding.device : deciding.spec, worst->element);
   } catch (const std::exception& error) {
     const std::string why = error.what();
-    return "Its intermediates are not known, since the run with probes failed: " +
-           why.substr(0, why.find('\n')) + "\n";
+    return inLines("Its intermediates are not known, since the run with probes failed: " +
+                   why.substr(0, why.find('\n')));
   }
 } catch (...) {
   return {};

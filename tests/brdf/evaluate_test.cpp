@@ -1,10 +1,12 @@
 // brdf/evaluate: the kernel against the model over five domains, laws on the kernel, bad input.
 //
 // Covered: every field of the result inside its interval in bulk, lobe, grazing, rough and
-// degenerate domains; sizes around a group; reciprocity; turned and mirrored axes; bounds of every
-// quantity; metals without diffuse; F monotone; the closed form E(alpha 1, NoV 1, F 1).
+// degenerate domains; every probe inside its own; sizes around a group; reciprocity; turned and
+// mirrored axes; bounds of every quantity; metals without diffuse; F monotone; the closed form
+// E(alpha 1, NoV 1, F 1).
 // Not covered: multiple scattering (the contract has none).
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -61,6 +63,15 @@ class BrdfEvaluateLaws : public BrdfEvaluate {
   }
 };
 
+/// Cases that judge the intermediates.
+class BrdfEvaluateProbes : public BrdfEvaluate {
+ protected:
+  void SetUp() override {
+    BrdfEvaluate::SetUp();
+    skipUnlessTheProbesAreOurs();
+  }
+};
+
 TEST_F(BrdfEvaluate, BulkStaysInsideTheBound) {
   expectInsideTheBound(bulk(generated("bulkElements"), caseSeed()));
 }
@@ -82,6 +93,21 @@ TEST_F(BrdfEvaluate, BadInputCountsAsTheContractSays) { expectInsideTheBound(deg
 TEST_F(BrdfEvaluate, EverySizeAroundAGroupIsWrittenExactly) {
   for (const std::size_t n : {0u, 1u, kGroupSize - 1, kGroupSize, kGroupSize + 1, 3 * kGroupSize})
     expectInsideTheBound(bulk(n, caseSeed() + n));
+}
+
+TEST_F(BrdfEvaluateProbes, EveryProbeStaysInsideItsBound) {
+  // Enough that every branch of the kernel is taken; its results have large domains of their own.
+  constexpr std::size_t kElements = 16 * std::size_t{kGroupSize};
+  for (const std::vector<Sample>& samples :
+       {bulk(kElements, caseSeed()), lobe(kElements, caseSeed()), grazing(kElements, caseSeed()),
+        degenerate()})
+    expectEveryProbeInside(dispatch(samples), modelOf(samples));
+}
+
+TEST_F(BrdfEvaluateProbes, ContractAndModelNameTheSame) {
+  const std::vector<Sample> samples = bulk(kGroupSize, caseSeed());
+  expectTheModelNamesEveryProbe(std::array{modelOf(samples)});
+  checked(samples.size());
 }
 
 TEST_F(BrdfEvaluateLaws, EveryResultIsFiniteAndInRange) {

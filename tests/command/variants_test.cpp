@@ -3,8 +3,11 @@
 //
 // A variant is the project's own kernel with some text replaced or optimised, or one of
 // data/kernels, judged through --kernel as a user's file would be.
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <fstream>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -25,6 +28,7 @@ struct Edit {
 /// A kernel of the project's with some text replaced, or optimised, or one of data/kernels.
 struct Variant {
   std::string name, kernel, verdict, adapter;
+  std::string probe;  ///< the intermediate that the message must name; empty: any, or none
   bool optimise = false;
   std::vector<Edit> edits;
 };
@@ -32,19 +36,31 @@ void PrintTo(const Variant& v, std::ostream* out) { *out << v.kernel << ": " << 
 
 Edit editOf(const nlohmann::json& j) { return {j["file"], j["from"], j["to"]}; }
 
+/// Throws where a key is not one of these: misspelt, it would be a demand that nobody checks.
+Variant variantOf(const nlohmann::json& j) {
+  constexpr std::array kKeys = {"name",     "kernel", "class", "probe", "adapter",
+                                "optimise", "edits",  "file",  "from",  "to"};
+  for (const auto& [key, value] : j.items())
+    if (std::ranges::find(kKeys, key) == kKeys.end())
+      throw std::runtime_error(fmt::format("a variant has no key '{}'", key));
+  Variant v{.name = j["name"],
+            .kernel = j["kernel"],
+            .verdict = j.value("class", "wrong"),
+            .adapter = j.value("adapter", ""),
+            .probe = j.value("probe", ""),
+            .optimise = j.value("optimise", false),
+            .edits = {}};
+  if (!v.probe.empty() && v.verdict != "wrong")
+    throw std::runtime_error(fmt::format("'{}' is right, so no probe of it diverges", v.name));
+  if (j.contains("from")) v.edits.push_back(editOf(j));
+  for (const auto& e : j.value("edits", nlohmann::json::array())) v.edits.push_back(editOf(e));
+  return v;
+}
+
 std::vector<Variant> variants(const char* list) {
   std::vector<Variant> all;
-  for (const auto& j : nlohmann::json::parse(std::ifstream(kRoot / "tests/variants" / list))) {
-    Variant v{.name = j["name"],
-              .kernel = j["kernel"],
-              .verdict = j.value("class", "wrong"),
-              .adapter = j.value("adapter", ""),
-              .optimise = j.value("optimise", false),
-              .edits = {}};
-    if (j.contains("from")) v.edits.push_back(editOf(j));
-    for (const auto& e : j.value("edits", nlohmann::json::array())) v.edits.push_back(editOf(e));
-    all.push_back(std::move(v));
-  }
+  for (const auto& j : nlohmann::json::parse(std::ifstream(kRoot / "tests/variants" / list)))
+    all.push_back(variantOf(j));
   return all;
 }
 
@@ -83,6 +99,14 @@ fs::path fileOf(const Variant& v, const Scratch& scratch) {
   return v.optimise ? optimised(shader, copy) : shader;
 }
 
+/// Whether a message says that it first diverges there: at "G" or a component of it, and not at
+/// another name that begins so.
+bool saysThatItDivergesAt(const std::string& probe, const std::string& output) {
+  const std::string said = "first diverges at " + probe;
+  return output.find(said + ":") != std::string::npos ||
+         output.find(said + ".") != std::string::npos;
+}
+
 class WrongVariant : public testing::TestWithParam<Variant> {};
 
 TEST_P(WrongVariant, IsCalledWrong) {
@@ -91,6 +115,8 @@ TEST_P(WrongVariant, IsCalledWrong) {
   const Said said = gnomonSays(fmt::format("validate {0} --cases 4096 --kernel {0}={1}", v.kernel,
                                            fileOf(v, scratch).string()));
   EXPECT_EQ(said.status, 1) << said.output;
+  if (v.probe.empty()) return;
+  EXPECT_TRUE(saysThatItDivergesAt(v.probe, said.output)) << v.probe << "\n" << said.output;
 }
 
 class RightVariant : public testing::TestWithParam<Variant> {};
@@ -111,6 +137,45 @@ std::string identifier(const testing::TestParamInfo<Variant>& info) {
   for (char& c : name)
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   return name;
+}
+
+TEST(Variants, AKeyThatNobodyReadsIsRefused) {
+  const nlohmann::json good = {{"name", "a fault"}, {"kernel", "brdf/evaluate"},
+                               {"probe", "G"},      {"file", "lib/brdf.glsl"},
+                               {"from", "1"},       {"to", "2"}};
+  EXPECT_EQ(variantOf(good).probe, "G");
+  nlohmann::json misspelt = good;
+  misspelt["prob"] = "G";
+  EXPECT_THROW(variantOf(misspelt), std::runtime_error);
+  nlohmann::json right = good;
+  right["class"] = "conforms";
+  EXPECT_THROW(variantOf(right), std::runtime_error);
+}
+
+/// A wrong kernel whose probes cannot be compiled: what is said of it.
+Said saidWithBrokenProbe(const Scratch& scratch) {
+  const Variant v{
+      .name = "pi, and a probe that the contract lacks",
+      .kernel = "brdf/evaluate",
+      .verdict = "wrong",
+      .adapter = "",
+      .probe = "",
+      .edits = {{"lib/brdf.glsl", "kPi = 3.14159265358979", "kPi = 3.14160265358979"},
+                {"brdf/evaluate.comp", "GNOMON_PROBE(G, o.G)", "GNOMON_PROBE(masking, o.G)"}}};
+  return gnomonSays("validate --filter '*LobeStays*' --cases 64 --kernel brdf/evaluate=" +
+                    fileOf(v, scratch).string());
+}
+
+// 64 samples of the lobe are judged wrong in D, with or without an explanation of where it began.
+TEST(Variants, WhereTheRunWithProbesFailsTheMessageStandsAndALineSaysWhy) {
+  const Scratch scratch;
+  const Said said = saidWithBrokenProbe(scratch);
+  EXPECT_EQ(said.status, 1) << said.output;
+  for (const char* part : {"The first field that is wrong, in the order of the contract, is D.",
+                           "Its intermediates are not known", "the run with probes failed",
+                           "masking", "  got  ", "  allowed  ", "reproduce: "})
+    EXPECT_NE(said.output.find(part), std::string::npos) << part << "\n" << said.output;
+  EXPECT_EQ(said.output.find("first diverges"), std::string::npos) << said.output;
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, WrongVariant, testing::ValuesIn(variants("wrong.json")),

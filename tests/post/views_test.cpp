@@ -1,10 +1,9 @@
 // post/views: every debug view against its model.
 //
 // Covered: albedo, normal, depth and cascades inside their intervals, over pictures whose sides are
-// no multiples of a group and over tiny ones; sky; distances around every split and blend zone; bad
-// input; an unknown mode; the linearisation against the projection it
-// inverts, and at both planes.
-// Not covered: the tile-light heat map (it comes with the lights).
+// no multiples of a group and over tiny ones; every probe inside its own; sky; distances around
+// every split and blend zone; bad input; an unknown mode; the linearisation against the projection
+// it inverts, and at both planes. Not covered: the tile-light heat map (it comes with the lights).
 #include <array>
 #include <cmath>
 #include <limits>
@@ -139,6 +138,36 @@ class PostViews : public KernelCase {
     });
   }
 };
+
+/// Cases that judge the intermediates.
+class PostViewsProbes : public PostViews {
+ protected:
+  void SetUp() override {
+    PostViews::SetUp();
+    skipUnlessTheProbesAreOurs();
+  }
+};
+
+// A few groups, the last ones in part.
+TEST_F(PostViewsProbes, EveryProbeStaysInsideItsBound) {
+  Scene scene = generatedScene({4 * kGroupSide + 5, 4 * kGroupSide + 3}, caseSeed());
+  for (const uint mode : kModes) {
+    scene.push.mode = mode;
+    expectEveryProbeInside(dispatch(scene), modelOf(scene));
+  }
+}
+
+// Each view reaches some of them: together all.
+TEST_F(PostViewsProbes, ContractAndModelNameTheSame) {
+  std::vector<Scene> scenes(kModes.size(), generatedScene({kGroupSide, kGroupSide}, caseSeed()));
+  std::vector<Expectation> all;
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    scenes[i].push.mode = kModes[i];
+    all.push_back(modelOf(scenes[i]));
+    checked(all.back().elements);
+  }
+  expectTheModelNamesEveryProbe(all);
+}
 
 TEST_F(PostViews, EveryModeStaysInsideTheBound) {
   Scene scene = generatedScene({251, 127}, caseSeed());

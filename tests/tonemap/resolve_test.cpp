@@ -2,7 +2,8 @@
 //
 // Covered: every curve with every transfer function in bulk, shadows and highlights; bloom smaller,
 // larger, as large and of one texel; sizes around a group; a 1920x1080 frame of sky, sun and specks
-// in a frame's own formats; bad input; exposure against scaled input; monotone ramps; range.
+// in a frame's own formats; every probe inside its own; bad input; exposure against scaled input;
+// monotone ramps; range.
 // Not covered: bloom or exposure outside the contract's ranges.
 #include <array>
 #include <cmath>
@@ -32,13 +33,12 @@ class TonemapResolve : public KernelCase {
 
   Observation dispatch(const Resolve& push, const InputImage& hdr, const InputImage& bloom,
                        unsigned beyond = 0) {
-    return run({.inputImages = {hdr, bloom},
-                .outputImages = {{.image = "target",
-                                  .width = push.size.x,
-                                  .height = push.size.y,
-                                  .beyond = beyond}},
-                .push = std::as_bytes(std::span(&push, 1)),
-                .extent = {push.size.x, push.size.y}});
+    return run(
+        {.inputImages = {hdr, bloom},
+         .outputImages =
+             {{.image = "target", .width = push.size.x, .height = push.size.y, .beyond = beyond}},
+         .push = std::as_bytes(std::span(&push, 1)),
+         .extent = {push.size.x, push.size.y}});
   }
 
   static Expectation modelOf(const Frame& frame) {
@@ -74,7 +74,33 @@ class TonemapResolve : public KernelCase {
   }
 };
 
+/// Cases that judge the intermediates.
+class TonemapResolveProbes : public TonemapResolve {
+ protected:
+  void SetUp() override {
+    TonemapResolve::SetUp();
+    skipUnlessTheProbesAreOurs();
+  }
+};
+
 const uvec2 kSize(251, 127);
+
+// A few groups, the last ones in part, under every curve; the transfer function has no probe.
+TEST_F(TonemapResolveProbes, EveryProbeStaysInsideItsBound) {
+  const uvec2 size(2 * kGroupSide + 5, kGroupSide + 3);
+  for (Frame frame : {bulk(size, caseSeed()), shadows(size, caseSeed()),
+                      highlights(size, caseSeed()), degenerate()})
+    for (const uint curve : kCurves) {
+      frame.push.curve = curve;
+      expectEveryProbeInside(dispatch(frame), modelOf(frame));
+    }
+}
+
+TEST_F(TonemapResolveProbes, ContractAndModelNameTheSame) {
+  const Frame frame = bulk({kGroupSide, kGroupSide}, caseSeed());
+  expectTheModelNamesEveryProbe(std::array{modelOf(frame)});
+  checked(frame.hdr.pixels());
+}
 
 TEST_F(TonemapResolve, BulkStaysInsideTheBound) {
   expectEveryCombinationInsideTheBound(bulk(kSize, caseSeed()));
@@ -105,8 +131,8 @@ TEST_F(TonemapResolve, EveryPieceOfATransferFunctionEndsWhereItShould) {
 }
 
 TEST_F(TonemapResolve, PixelsBeyondTheSizeAreNotTouched) {
-  for (const uvec2 size : {uvec2(kGroupSide + 5, kGroupSide), uvec2(kGroupSide, kGroupSide + 5),
-                           uvec2(1, 1)}) {
+  for (const uvec2 size :
+       {uvec2(kGroupSide + 5, kGroupSide), uvec2(kGroupSide, kGroupSide + 5), uvec2(1, 1)}) {
     const Frame frame = bulk(size, caseSeed());
     expectClean(dispatch(frame, kGroupSide));
     checked(std::size_t{size.x} * size.y);
