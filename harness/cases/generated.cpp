@@ -233,9 +233,8 @@ std::optional<ShrunkFailure> shrinkFailure(Generated& generated, const Trial& tr
   } catch (const std::exception&) {  // the device went: the message of the original has to do
   }
   if (!alone) return std::nullopt;
-  return ShrunkFailure{
-      .text = story(shrunk, *failure) + explainInput(generated, *alone, subject),
-      .file = written(shrunk.input, *failure, subject)};
+  return ShrunkFailure{.text = story(shrunk, *failure) + explainInput(generated, *alone, subject),
+                       .file = written(shrunk.input, *failure, subject)};
 }
 
 }  // namespace gnomon

@@ -53,8 +53,7 @@ int list(const ListOptions& options) {
   if (options.what == "kernels") lines = listKernels(cases);
   if (options.what == "cases")
     for (const CaseName& c : cases) lines.push_back({c.name, ""});
-  if (options.json != "-")
-    printColumns(lines);
+  if (options.json != "-") printColumns(lines);
   if (!options.json.empty()) {
     auto array = nlohmann::json::array();
     for (const Line& l : lines) array.push_back(l.name);

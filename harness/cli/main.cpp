@@ -76,7 +76,8 @@ void addShard(CLI::App& command, Selection& selection) {
 
 std::string operatorsHelp() {
   std::string text = "Only these operators, with commas between:";
-  for (const OperatorInfo& o : mutationOperators()) text += fmt::format(" {} ({});", o.name, o.summary);
+  for (const OperatorInfo& o : mutationOperators())
+    text += fmt::format(" {} ({});", o.name, o.summary);
   text.back() = '.';
   return text;
 }

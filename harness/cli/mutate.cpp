@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 /// A mutant that no case tells from the kernel.
 struct Survivor {
-  const Mutant* mutant = nullptr;
-  const Explanation* explanation = nullptr;  ///< or none
+  const Mutant* mutant = nullptr;            ///< of the outcome's answer
+  std::optional<std::string> explanation{};  ///< the reason on record
 };
 
 /// What a run says of one kernel, against what is on record.
@@ -53,9 +53,10 @@ std::string scoreText(const Score& s) {
 }
 
 /// An explanation holds for the line and the change that it was written for.
-const Explanation* explanationOf(const MutantRecord& record, const Mutant& m) {
+std::optional<std::string> explanationOf(const MutantRecord& record, const Mutant& m) {
   const Explanation* e = record.find(m.id);
-  return e != nullptr && e->text == m.place.text && e->change == m.change ? e : nullptr;
+  if (e == nullptr || e->text != m.place.text || e->change != m.change) return std::nullopt;
+  return e->reason;
 }
 
 Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& policy, bool whole) {
@@ -66,7 +67,7 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
   for (std::size_t i = 0; i < a.mutants.size(); ++i) {
     if (!a.fates[i].survived()) continue;
     outcome.survivors.push_back({&a.mutants[i], explanationOf(record, a.mutants[i])});
-    unexplained += outcome.survivors.back().explanation == nullptr;
+    unexplained += !outcome.survivors.back().explanation;
   }
   if (unexplained > 0)
     outcome.problems.push_back(fmt::format(
@@ -79,7 +80,7 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
                                            policy["mutationScore"]));
   for (const Explanation& e : record.survivors) {
     const bool needed = std::ranges::any_of(outcome.survivors, [&](const Survivor& s) {
-      return s.explanation == &e;
+      return s.mutant->id == e.id && s.explanation;
     });
     if (!needed)
       outcome.problems.push_back(fmt::format(
@@ -91,8 +92,7 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
 
 std::string describe(const Survivor& s) {
   const Mutant& m = *s.mutant;
-  const std::string why =
-      s.explanation ? "explained: " + s.explanation->reason : "NOT EXPLAINED";
+  const std::string why = s.explanation ? "explained: " + *s.explanation : "NOT EXPLAINED";
   if (m.place.file.empty()) return fmt::format("  {}\n    {}\n", m.id, why);
   return fmt::format("  kernels/{}:{}  {}\n    {}\n    {}\n    {}\n", m.place.file, m.place.line,
                      m.id, m.place.text, m.change, why);
@@ -102,7 +102,7 @@ std::string describe(const Survivor& s) {
 void printSurvivors(Terminal& terminal, const Outcome& outcome) {
   std::string text;
   for (const Survivor& s : outcome.survivors)
-    if (s.explanation == nullptr || !isModel(outcome.answer.kernel)) text += describe(s);
+    if (!s.explanation || !isModel(outcome.answer.kernel)) text += describe(s);
   if (!text.empty())
     terminal.print(fmt::format("survivors of {}\n{}", outcome.answer.kernel, text));
 }
@@ -112,7 +112,7 @@ std::string outcomeTable(const std::vector<Outcome>& outcomes, const Terminal& t
       {"mutants of", "mutants", "equivalent", "killed", "survived", "explained", "score", "time"}};
   for (const Outcome& o : outcomes) {
     const std::size_t explained = static_cast<std::size_t>(std::ranges::count_if(
-        o.survivors, [](const Survivor& s) { return s.explanation != nullptr; }));
+        o.survivors, [](const Survivor& s) { return s.explanation.has_value(); }));
     rows.push_back({o.answer.kernel, grouped(o.score.mutants), grouped(o.score.equivalent),
                     grouped(o.score.killed), grouped(o.survivors.size()), grouped(explained),
                     terminal.paint(o.problems.empty() ? Colour::kGreen : Colour::kRed,
@@ -136,7 +136,7 @@ std::string outcomesJson(const std::vector<Outcome>& outcomes, const MutateOptio
     for (const Survivor& s : o.survivors) {
       survived.push_back(jsonOf(*s.mutant));
       survived.back()["reason"] =
-          s.explanation ? nlohmann::json(s.explanation->reason) : nlohmann::json(nullptr);
+          s.explanation ? nlohmann::json(*s.explanation) : nlohmann::json(nullptr);
     }
     for (std::size_t i = 0; i < o.answer.mutants.size(); ++i) {
       const Fate& fate = o.answer.fates[i];
@@ -181,8 +181,8 @@ std::string cellOf(const MutantRecords& records, const std::string& kernel) {
     text = scoreText(*r->second.score);
   const auto model = records.find(kernel + std::string(kModel));
   if (model != records.end() && model->second.score)
-    text += fmt::format("; model {} of {}", model->second.score->killed,
-                        model->second.score->mutants);
+    text +=
+        fmt::format("; model {} of {}", model->second.score->killed, model->second.score->mutants);
   return text;
 }
 
@@ -231,7 +231,8 @@ int mutate(const MutateOptions& options) {
   const std::vector<std::string> kernels = mutatedKernels(options.stages);
   const bool whole = !options.sample && options.operators.empty();
   if (options.bless && !whole)
-    throw UsageError("--bless records the score of a whole run: leave out --sample and --operators");
+    throw UsageError(
+        "--bless records the score of a whole run: leave out --sample and --operators");
   if (options.bless && !options.session.kernels.empty())
     throw UsageError("--bless records the scores of the project's own kernels: leave out --kernel");
   Mutation mutation(options.session, options.jobs, options.json);

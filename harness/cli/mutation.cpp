@@ -21,8 +21,8 @@ Mutation::Mutation(SessionOptions session, std::optional<unsigned> jobs, const s
       out(json == "-" ? stderr : stdout),
       prepared(prepare(options, choices)),
       schedule{options, choices, jobs.value_or(defaultJobs()), prepared.errors} {
-  out.print(fmt::format("{}, {}, Vulkan {}, seed {}", gpu().name, gpu().driver, gpu().api,
-                        options.seed));
+  out.print(
+      fmt::format("{}, {}, Vulkan {}, seed {}", gpu().name, gpu().driver, gpu().api, options.seed));
 }
 
 Answer Mutation::ask(const Question& question) {
@@ -32,12 +32,12 @@ Answer Mutation::ask(const Question& question) {
 }
 
 InquiryObserver Mutation::observer(const std::string& what) {
-  return {[this, what](std::size_t known, std::size_t all, std::size_t killed,
-                       const std::string& now) {
-    if (!remembered && all > 0) remembered = known;
-    out.progress(fmt::format("{} [{}/{}] {} killed{}: {}", what, known, all, killed,
-                             timeLeft(known, all), now));
-  }};
+  return {
+      [this, what](std::size_t known, std::size_t all, std::size_t killed, const std::string& now) {
+        if (!remembered && all > 0) remembered = known;
+        out.progress(fmt::format("{} [{}/{}] {} killed{}: {}", what, known, all, killed,
+                                 timeLeft(known, all), now));
+      }};
 }
 
 std::string Mutation::timeLeft(std::size_t known, std::size_t all) const {

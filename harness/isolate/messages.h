@@ -16,10 +16,10 @@ struct WorkerTask {
   SessionOptions session{};
   std::vector<std::string> cases{};      ///< by name, in this order; none: to prepare only
   std::optional<DeviceErrors> errors{};  ///< of the device; none: as a file says
-  std::string mutated{};                 ///< the kernel whose mutants the cases are to tell; or none
-  std::vector<std::string> mutants{};    ///< by id (harness/mutate/mutants.h): one after another
+  std::string mutated{};               ///< the kernel whose mutants the cases are to tell; or none
+  std::vector<std::string> mutants{};  ///< by id (harness/mutate/mutants.h): one after another
   bool models = false;  ///< the mutants are of that kernel's model; none: to list them only
-  unsigned kills = 1;                    ///< cases that have to fail before the next mutant's turn
+  unsigned kills = 1;   ///< cases that have to fail before the next mutant's turn
 };
 
 /// What a worker without cases has found: the device, and that the foreign kernels can be loaded.

@@ -89,12 +89,10 @@ class Campaign {
     const std::size_t size = std::min(kMost, share);
     for (std::size_t begin = 0; begin < chosen.size(); begin += size) {
       const auto from = chosen.begin() + static_cast<std::ptrdiff_t>(begin);
-      const auto to = chosen.begin() +
-                      static_cast<std::ptrdiff_t>(std::min(begin + size, chosen.size()));
-      chunks.push_back({.mutants = {from, to},
-                        .cases = cases,
-                        .environment = environment,
-                        .where = where});
+      const auto to =
+          chosen.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, chosen.size()));
+      chunks.push_back(
+          {.mutants = {from, to}, .cases = cases, .environment = environment, .where = where});
     }
     {
       std::vector<std::jthread> threads;
@@ -160,7 +158,8 @@ class Campaign {
     const std::size_t done = chunk.mutants.front();
     chunk.mutants.erase(chunk.mutants.begin());
     const std::lock_guard lock(mutex);
-    if (observer.told && (last || !fates[done].survived())) observer.told(mutants[done], fates[done]);
+    if (observer.told && (last || !fates[done].survived()))
+      observer.told(mutants[done], fates[done]);
   }
 
   /// The worker died over its mutant: that is a kill, and the cases behind may find another.
@@ -207,27 +206,24 @@ std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& ke
   std::erase_if(cases, judgesModel);
   std::vector<Witness> witnesses;
   std::string broken;
-  const auto batches = batchesOf(cases, schedule.session,
-                                 static_cast<std::size_t>(schedule.policy["batchCases"]));
+  const auto batches =
+      batchesOf(cases, schedule.session, static_cast<std::size_t>(schedule.policy["batchCases"]));
   runBatches(schedule, batches,
              {.begun = [](const CaseName&) {},
               .ended =
                   [&](CaseRecord r) {
                     if (r.failed) broken += (broken.empty() ? "" : ", ") + r.name;
                     if (r.skipped || r.unsupported) return;
-                    witnesses.push_back({{r.name, r.kernel},
-                                         r.seconds,
-                                         r.threadsCommunicate,
-                                         r.usesSubgroups});
+                    witnesses.push_back(
+                        {{r.name, r.kernel}, r.seconds, r.threadsCommunicate, r.usesSubgroups});
                   }});
   if (!broken.empty())
     throw CaseFailure(
         fmt::format("{} fails {} without being mutated, so nothing can be said of its mutants.\n"
                     "`gnomon validate {}` says why",
                     kernel, broken, kernel));
-  std::ranges::sort(witnesses, {}, [](const Witness& w) {
-    return std::pair(w.seconds, w.name.name);
-  });
+  std::ranges::sort(witnesses, {},
+                    [](const Witness& w) { return std::pair(w.seconds, w.name.name); });
   return witnesses;
 }
 

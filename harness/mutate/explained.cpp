@@ -38,8 +38,7 @@ MutantRecord recordFrom(const Json& json, const std::string& where) {
                          .killed = countAt(score, "killed", at)};
   }
   if (!json.contains("survivors")) return record;
-  if (!json["survivors"].is_array())
-    throw UsageError(where + ": \"survivors\" is not a list");
+  if (!json["survivors"].is_array()) throw UsageError(where + ": \"survivors\" is not a list");
   for (const Json& s : json["survivors"]) {
     const std::string id = textAt(s, "id", where + ", survivors");
     const std::string at = where + ", " + id;
@@ -113,8 +112,7 @@ void saveMutantRecords(const std::filesystem::path& file, const MutantRecords& r
   if (!out) throw UsageError(fmt::format("{}: cannot be written", file.string()));
 }
 
-std::string withScores(const std::string& readme,
-                       const std::map<std::string, std::string>& cells) {
+std::string withScores(const std::string& readme, const std::map<std::string, std::string>& cells) {
   std::istringstream in(readme);
   std::string text, line;
   bool inTable = false, found = false;

@@ -40,8 +40,8 @@ struct MutantRecord {
 using MutantRecords = std::map<std::string, MutantRecord>;
 
 /// Reads {"brdf/evaluate": {"score": {"mutants", "equivalent", "killed"}, "survivors": [{"id",
-/// "change", "text", "reason"}]}}; empty if there is no file. Throws UsageError naming file and entry
-/// where one lacks something or gives no reason.
+/// "change", "text", "reason"}]}}; empty if there is no file. Throws UsageError naming file and
+/// entry where one lacks something or gives no reason.
 MutantRecords loadMutantRecords(const std::filesystem::path& file);
 
 /// Throws UsageError where it cannot be written.

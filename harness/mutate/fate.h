@@ -17,7 +17,7 @@ struct Kill {
 
 struct Fate {
   std::vector<Kill> kills{};  ///< in the order in which they were found; none: it survives
-  unsigned sought = 1;        ///< so many kills were looked for: fewer means that no other case kills
+  unsigned sought = 1;  ///< so many kills were looked for: fewer means that no other case kills
   bool survived() const { return kills.empty(); }
 };
 

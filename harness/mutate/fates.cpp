@@ -80,10 +80,10 @@ void FateCache::write(std::uint64_t key, const Fate& fate) {
 
 std::optional<std::uint64_t> evidenceHash(const fs::path& root, const std::string& stage) {
   std::vector<fs::path> files;
-  for (const std::string& part :
-       {"tests/" + stage, "reference/" + stage, "kernels/" + stage, std::string("kernels/contract.h"),
-        std::string("harness"), std::string("reference/bound"), std::string("reference/truth"),
-        std::string("tests/policy.json"), std::string("data/frames")})
+  for (const std::string& part : {"tests/" + stage, "reference/" + stage, "kernels/" + stage,
+                                  std::string("kernels/contract.h"), std::string("harness"),
+                                  std::string("reference/bound"), std::string("reference/truth"),
+                                  std::string("tests/policy.json"), std::string("data/frames")})
     collect(root / part, files);
   std::ranges::sort(files);
   std::error_code error;

@@ -36,9 +36,9 @@ class FateCache {
   std::ofstream out;
 };
 
-/// A hash of all sources that decide what a stage's cases say of a kernel: the stage's tests, models
-/// and records, the harness, bounds, truth, policy and data. Empty where one of them is younger than
-/// the running command, which then is not made of them.
+/// A hash of all sources that decide what a stage's cases say of a kernel: the stage's tests,
+/// models and records, the harness, bounds, truth, policy and data. Empty where one of them is
+/// younger than the running command, which then is not made of them.
 std::optional<std::uint64_t> evidenceHash(const std::filesystem::path& root,
                                           const std::string& stage);
 

@@ -38,8 +38,8 @@ void keepSample(std::vector<Mutant>& mutants, std::size_t count, std::uint64_t s
   std::ranges::sort(mutants, {}, &Mutant::id);
 }
 
-/// A mutant may hang, and then takes all the time that a case has: ten times what the slowest needs,
-/// instead of a minute.
+/// A mutant may hang, and then takes all the time that a case has: ten times what the slowest
+/// needs, instead of a minute.
 std::chrono::seconds patience(const std::vector<Witness>& witnesses) {
   constexpr double kTimes = 10, kLeast = 3;
   double slowest = 0;
@@ -58,8 +58,7 @@ std::filesystem::path cacheFile(const Preparation& prepared, std::string kernel)
 /// What a fate depends on besides the mutant.
 std::optional<std::uint64_t> circumstances(const Schedule& schedule, const Preparation& prepared,
                                            const std::string& kernel) {
-  const auto evidence =
-      evidenceHash(schedule.session.root, kernel.substr(0, kernel.find('/')));
+  const auto evidence = evidenceHash(schedule.session.root, kernel.substr(0, kernel.find('/')));
   if (!evidence) return std::nullopt;
   return hashOf(fmt::format("{} {} {} {}", *evidence, schedule.session.seed,
                             schedule.session.cases.value_or(0), toJson(prepared)));
@@ -136,20 +135,19 @@ class Inquiry {
     SessionOptions session = schedule.session;
     if (!session.timeout) session.timeout = patience(witnesses);
     session.shrinks = session.probes = false;  // that it fails is all that is asked
-    judgeMutants({session, schedule.policy, schedule.jobs, schedule.errors}, prepared.gpu,
-                 question.kernel, open, witnesses, question.sought,
-                 {.begun = [this](const Mutant& m) { tell(m.id); },
-                  .told = [&](const Mutant& m,
-                              const Fate& fate) { settle(m.id, fate, cache, about); }});
+    judgeMutants(
+        {session, schedule.policy, schedule.jobs, schedule.errors}, prepared.gpu, question.kernel,
+        open, witnesses, question.sought,
+        {.begun = [this](const Mutant& m) { tell(m.id); },
+         .told = [&](const Mutant& m, const Fate& fate) { settle(m.id, fate, cache, about); }});
   }
 
   void judgeModel(const std::vector<Mutant>& open, FateCache& cache, std::uint64_t about) {
     std::vector<std::string> ids;
     for (const Mutant& m : open) ids.push_back(m.id);
-    judgeModelMutants(schedule, question.kernel, ids, question.sought,
-                      [&](const std::string& id, const Fate& fate) {
-                        settle(id, fate, cache, about);
-                      });
+    judgeModelMutants(
+        schedule, question.kernel, ids, question.sought,
+        [&](const std::string& id, const Fate& fate) { settle(id, fate, cache, about); });
   }
 
   void settle(const std::string& id, const Fate& fate, FateCache& cache, std::uint64_t about) {

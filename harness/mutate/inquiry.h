@@ -1,4 +1,5 @@
-// Everything that is to be known of a kernel's mutants, found out as far as it is not known already.
+// Everything that is to be known of a kernel's mutants, found out as far as it is not known
+// already.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +16,11 @@ namespace gnomon {
 
 /// What is asked.
 struct Question {
-  std::string kernel{};                ///< "brdf/evaluate"
-  std::set<std::string> operators{};   ///< by name; empty: all
+  std::string kernel{};                 ///< "brdf/evaluate"
+  std::set<std::string> operators{};    ///< by name; empty: all
   std::optional<std::size_t> sample{};  ///< so many of the mutants, chosen by the session's seed
-  bool ofModel = false;                ///< of the kernel's model, whose operators are its own
-  unsigned sought = 1;                 ///< kills of each: 2 tells whether a case kills alone
+  bool ofModel = false;                 ///< of the kernel's model, whose operators are its own
+  unsigned sought = 1;                  ///< kills of each: 2 tells whether a case kills alone
 };
 
 /// What is answered.
@@ -46,8 +47,8 @@ struct InquiryObserver {
 /// UsageError where one does not exist or none is left.
 std::vector<std::string> mutatedKernels(const std::vector<std::string>& stages);
 
-/// Finds out what earlier runs have not: fates are kept in the user's cache. Throws CaseFailure where
-/// cases fail on the kernel, or the model, as it is; UsageError, DeviceError.
+/// Finds out what earlier runs have not: fates are kept in the user's cache. Throws CaseFailure
+/// where cases fail on the kernel, or the model, as it is; UsageError, DeviceError.
 Answer inquire(const Schedule& schedule, const Preparation& prepared, const Question& question,
                const InquiryObserver& observer);
 

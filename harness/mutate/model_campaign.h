@@ -11,8 +11,9 @@
 
 namespace gnomon {
 
-/// Every mutant of the model, found in a worker that counts operations under the model's tests; none
-/// where no test calls the model so. Throws CaseFailure where a test fails on the model as it is.
+/// Every mutant of the model, found in a worker that counts operations under the model's tests;
+/// none where no test calls the model so. Throws CaseFailure where a test fails on the model as it
+/// is.
 std::vector<NamedModelMutant> listModelMutants(const Schedule& schedule, const std::string& kernel);
 
 /// The tests on each of these mutants, cheapest first, in workers. `told` is called once for each,

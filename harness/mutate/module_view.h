@@ -49,8 +49,8 @@ class ModuleView {
   SpirvId pointeeOf(SpirvId id) const;  ///< of a pointer's type; 0: it is none
   /// Of a float or integer of 32 bits, or a vector of such: that scalar type; else 0.
   SpirvId scalarOf(SpirvId type) const;
-  bool isFloat(SpirvId type) const;     ///< scalar type of 32 bits
-  bool isInteger(SpirvId type) const;   ///< scalar type of 32 bits
+  bool isFloat(SpirvId type) const;         ///< scalar type of 32 bits
+  bool isInteger(SpirvId type) const;       ///< scalar type of 32 bits
   unsigned components(SpirvId type) const;  ///< of a vector; else 1
 
   std::string nameOf(SpirvId id) const;  ///< from OpName, "?" without one

@@ -22,8 +22,7 @@ void forEachEdit(const ModuleView& view, const Take& take) {
     std::optional<SourcePlace> place;  // looked up only where there is something to change
     proposeEdits(view, index, [&](std::string_view operatorName, const Edit& edit) {
       if (!place) place = view.placeOf(index);
-      const std::string group =
-          fmt::format("{}:{}:{}", place->file, place->function, operatorName);
+      const std::string group = fmt::format("{}:{}:{}", place->file, place->function, operatorName);
       take(Mutant{.id = fmt::format("{}:{}", group, ++counts[group]),
                   .operatorName = std::string(operatorName),
                   .place = *place,

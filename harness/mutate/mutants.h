@@ -26,8 +26,8 @@ struct Mutant {
 struct MutantSet {
   std::vector<Mutant> mutants{};     ///< to be judged, in the order of the code
   std::vector<Mutant> equivalent{};  ///< with the original's normal form: nothing can tell them
-  std::size_t invalid = 0;     ///< no valid SPIR-V
-  std::size_t duplicates = 0;  ///< with the normal form of a mutant before them
+  std::size_t invalid = 0;           ///< no valid SPIR-V
+  std::size_t duplicates = 0;        ///< with the normal form of a mutant before them
 };
 
 /// Every mutant by these operators (none named: by all) of the code that the module's entry points

@@ -76,8 +76,7 @@ class Hasher {
         parts.push_back(isId(operand.type) ? meaningOf(word) : word);
       }
     }
-    if (commutes(i.opcode) && parts.size() >= 2)
-      std::ranges::sort(parts.end() - 2, parts.end());
+    if (commutes(i.opcode) && parts.size() >= 2) std::ranges::sort(parts.end() - 2, parts.end());
     std::uint64_t hash = mixed(kHashBasis, i.opcode);
     for (const std::uint64_t part : parts) hash = mixed(hash, part);
     // What stands in a function has its place too: two loads of one variable are not the same.

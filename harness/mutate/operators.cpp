@@ -17,7 +17,7 @@ namespace {
 /// pass (1e-3): whoever keeps that rule sees it wherever the constant reaches the result.
 constexpr float kNudge = 1e-4f;
 
-constexpr std::size_t kResult = 3;     // word of an instruction's first operand behind its result
+constexpr std::size_t kResult = 3;      // word of an instruction's first operand behind its result
 constexpr std::size_t kExtOperand = 5;  // of an extended instruction's first operand
 constexpr std::size_t kArgument = 4;    // of a function call's first argument
 
@@ -30,7 +30,9 @@ struct Site {
   const SpirvInstruction& instruction() const { return view.at(index); }
   std::span<const std::uint32_t> words() const { return view.wordsOf(index); }
   std::uint32_t opcode() const { return instruction().opcode; }
-  std::uint32_t glsl() const { return instruction().glsl ? words()[4] : std::uint32_t{GLSLstd450Bad}; }
+  std::uint32_t glsl() const {
+    return instruction().glsl ? words()[4] : std::uint32_t{GLSLstd450Bad};
+  }
 
   Edit edit(std::string change) const {
     Edit made(view, index);
@@ -63,40 +65,46 @@ struct Swap {
 };
 
 constexpr Swap kArithmetic[] = {
-    {spv::OpFAdd, spv::OpFSub, "+ becomes -"},   {spv::OpFSub, spv::OpFAdd, "- becomes +"},
-    {spv::OpFMul, spv::OpFDiv, "* becomes /"},   {spv::OpFDiv, spv::OpFMul, "/ becomes *"},
-    {spv::OpIAdd, spv::OpISub, "+ becomes -"},   {spv::OpISub, spv::OpIAdd, "- becomes +"},
-    {spv::OpIMul, spv::OpIAdd, "* becomes +"},   {spv::OpUDiv, spv::OpIMul, "/ becomes *"},
-    {spv::OpSDiv, spv::OpIMul, "/ becomes *"},   {spv::OpUMod, spv::OpUDiv, "% becomes /"},
-    {spv::OpSMod, spv::OpSDiv, "% becomes /"},   {spv::OpSRem, spv::OpSDiv, "% becomes /"},
-    {spv::OpFMod, spv::OpFDiv, "mod becomes /"}, {spv::OpBitwiseAnd, spv::OpBitwiseOr, "& becomes |"},
+    {spv::OpFAdd, spv::OpFSub, "+ becomes -"},
+    {spv::OpFSub, spv::OpFAdd, "- becomes +"},
+    {spv::OpFMul, spv::OpFDiv, "* becomes /"},
+    {spv::OpFDiv, spv::OpFMul, "/ becomes *"},
+    {spv::OpIAdd, spv::OpISub, "+ becomes -"},
+    {spv::OpISub, spv::OpIAdd, "- becomes +"},
+    {spv::OpIMul, spv::OpIAdd, "* becomes +"},
+    {spv::OpUDiv, spv::OpIMul, "/ becomes *"},
+    {spv::OpSDiv, spv::OpIMul, "/ becomes *"},
+    {spv::OpUMod, spv::OpUDiv, "% becomes /"},
+    {spv::OpSMod, spv::OpSDiv, "% becomes /"},
+    {spv::OpSRem, spv::OpSDiv, "% becomes /"},
+    {spv::OpFMod, spv::OpFDiv, "mod becomes /"},
+    {spv::OpBitwiseAnd, spv::OpBitwiseOr, "& becomes |"},
     {spv::OpBitwiseOr, spv::OpBitwiseAnd, "| becomes &"},
     {spv::OpBitwiseXor, spv::OpBitwiseOr, "^ becomes |"},
     {spv::OpShiftLeftLogical, spv::OpShiftRightLogical, "<< becomes >>"},
     {spv::OpShiftRightLogical, spv::OpShiftLeftLogical, ">> becomes <<"},
     {spv::OpShiftRightArithmetic, spv::OpShiftLeftLogical, ">> becomes <<"}};
 
-constexpr Swap kFunctions[] = {
-    {GLSLstd450FMin, GLSLstd450FMax, "min becomes max"},
-    {GLSLstd450FMax, GLSLstd450FMin, "max becomes min"},
-    {GLSLstd450UMin, GLSLstd450UMax, "min becomes max"},
-    {GLSLstd450UMax, GLSLstd450UMin, "max becomes min"},
-    {GLSLstd450SMin, GLSLstd450SMax, "min becomes max"},
-    {GLSLstd450SMax, GLSLstd450SMin, "max becomes min"},
-    {GLSLstd450NMin, GLSLstd450NMax, "min becomes max"},
-    {GLSLstd450NMax, GLSLstd450NMin, "max becomes min"},
-    {GLSLstd450Sqrt, GLSLstd450InverseSqrt, "sqrt becomes inversesqrt"},
-    {GLSLstd450InverseSqrt, GLSLstd450Sqrt, "inversesqrt becomes sqrt"},
-    {GLSLstd450Floor, GLSLstd450Ceil, "floor becomes ceil"},
-    {GLSLstd450Ceil, GLSLstd450Floor, "ceil becomes floor"},
-    {GLSLstd450Exp, GLSLstd450Exp2, "exp becomes exp2"},
-    {GLSLstd450Exp2, GLSLstd450Exp, "exp2 becomes exp"},
-    {GLSLstd450Log, GLSLstd450Log2, "log becomes log2"},
-    {GLSLstd450Log2, GLSLstd450Log, "log2 becomes log"},
-    {GLSLstd450Sin, GLSLstd450Cos, "sin becomes cos"},
-    {GLSLstd450Cos, GLSLstd450Sin, "cos becomes sin"},
-    {GLSLstd450FindUMsb, GLSLstd450FindILsb, "findMSB becomes findLSB"},
-    {GLSLstd450FindILsb, GLSLstd450FindUMsb, "findLSB becomes findMSB"}};
+constexpr Swap kFunctions[] = {{GLSLstd450FMin, GLSLstd450FMax, "min becomes max"},
+                               {GLSLstd450FMax, GLSLstd450FMin, "max becomes min"},
+                               {GLSLstd450UMin, GLSLstd450UMax, "min becomes max"},
+                               {GLSLstd450UMax, GLSLstd450UMin, "max becomes min"},
+                               {GLSLstd450SMin, GLSLstd450SMax, "min becomes max"},
+                               {GLSLstd450SMax, GLSLstd450SMin, "max becomes min"},
+                               {GLSLstd450NMin, GLSLstd450NMax, "min becomes max"},
+                               {GLSLstd450NMax, GLSLstd450NMin, "max becomes min"},
+                               {GLSLstd450Sqrt, GLSLstd450InverseSqrt, "sqrt becomes inversesqrt"},
+                               {GLSLstd450InverseSqrt, GLSLstd450Sqrt, "inversesqrt becomes sqrt"},
+                               {GLSLstd450Floor, GLSLstd450Ceil, "floor becomes ceil"},
+                               {GLSLstd450Ceil, GLSLstd450Floor, "ceil becomes floor"},
+                               {GLSLstd450Exp, GLSLstd450Exp2, "exp becomes exp2"},
+                               {GLSLstd450Exp2, GLSLstd450Exp, "exp2 becomes exp"},
+                               {GLSLstd450Log, GLSLstd450Log2, "log becomes log2"},
+                               {GLSLstd450Log2, GLSLstd450Log, "log2 becomes log"},
+                               {GLSLstd450Sin, GLSLstd450Cos, "sin becomes cos"},
+                               {GLSLstd450Cos, GLSLstd450Sin, "cos becomes sin"},
+                               {GLSLstd450FindUMsb, GLSLstd450FindILsb, "findMSB becomes findLSB"},
+                               {GLSLstd450FindILsb, GLSLstd450FindUMsb, "findLSB becomes findMSB"}};
 
 /// Operations of two operands of the result's type.
 bool isBinary(std::uint32_t opcode) {
@@ -134,8 +142,7 @@ void arithmetic(const Site& site) {
   if (opcode == spv::OpDot && words[kResult] != words[kResult + 1])
     site.exchange("arithmetic", "dot(a, b) becomes dot(a, a)", kResult + 1, words[kResult]);
   for (const std::size_t word : {kResult, kResult + 1}) {  // a matrix that is not applied
-    const bool product =
-        opcode == spv::OpMatrixTimesVector || opcode == spv::OpVectorTimesMatrix;
+    const bool product = opcode == spv::OpMatrixTimesVector || opcode == spv::OpVectorTimesMatrix;
     if (product && site.view.typeOf(words[word]) == site.instruction().typeId)
       site.alias("arithmetic", "the matrix is forgotten", words[word]);
   }
@@ -715,9 +722,9 @@ void subgroup(const Site& site) {
       site.alias("subgroup", "the lane's own value", words[w]);
       break;
     }
-  const bool scans = opcode == spv::OpGroupNonUniformBallotBitCount ||
-                     (opcode >= spv::OpGroupNonUniformIAdd &&
-                      opcode <= spv::OpGroupNonUniformLogicalXor);
+  const bool scans =
+      opcode == spv::OpGroupNonUniformBallotBitCount ||
+      (opcode >= spv::OpGroupNonUniformIAdd && opcode <= spv::OpGroupNonUniformLogicalXor);
   if (!scans) return;
   constexpr std::array kNames = {"reduction", "inclusive scan", "exclusive scan"};
   for (std::uint32_t to = spv::GroupOperationReduce; to <= spv::GroupOperationExclusiveScan; ++to)

@@ -97,8 +97,8 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 
 std::vector<Sample> degenerate() {
   // The last ones: whose squares underflow or overflow, and, nearer, do not.
-  const std::vector<float> special = specialFloats(
-      {kMinRoughness, kShortestHalf, kMinNoV, 1e-10f, 1e10f, 1e-30f, 1e30f});
+  const std::vector<float> special =
+      specialFloats({kMinRoughness, kShortestHalf, kMinNoV, 1e-10f, 1e10f, 1e-30f, 1e30f});
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),
                         .roughness = 0.4f,
                         .view = glm::normalize(vec3(0.3f, -0.2f, 0.8f)),

@@ -1,10 +1,10 @@
 // Mutants of SPIR-V modules: what operators change, under which names, what counts as the same
 // computation, and that a missing barrier or a torn atomic is told from the kernel.
 //
-// Covered: each operator on a small kernel; ids that do not depend on lines; source lines; code that
-// cannot run; duplicates and equivalents; the normal form; validity of every mutant; barriers and
-// atomics judged on the device; the cache of fates; records of explained survivors.
-// Not covered: campaigns (tests/command/mutate_test.cpp).
+// Covered: each operator on a small kernel; ids that do not depend on lines; source lines; code
+// that cannot run; duplicates and equivalents; the normal form; validity of every mutant; barriers
+// and atomics judged on the device; the cache of fates; records of explained survivors. Not
+// covered: campaigns (tests/command/mutate_test.cpp).
 #include "harness/mutate/mutants.h"
 
 #include <algorithm>
@@ -99,8 +99,9 @@ TEST(Mutants, EveryMutantIsValidAndDiffersFromTheKernel) {
 }
 
 TEST(Mutants, AreNamedByFunctionOperatorAndCount) {
-  const MutantSet found = mutantsOf(
-      kernel("y[i] = twice(x[i]);", "float twice(float v) {\nreturn v * 2.0;\n}\n"), {"arithmetic"});
+  const MutantSet found =
+      mutantsOf(kernel("y[i] = twice(x[i]);", "float twice(float v) {\nreturn v * 2.0;\n}\n"),
+                {"arithmetic"});
   ASSERT_EQ(found.mutants.size(), 2u);
   EXPECT_TRUE(found.mutants[0].id.ends_with(":twice:arithmetic:1")) << found.mutants[0].id;
   EXPECT_TRUE(found.mutants[1].id.ends_with(":twice:arithmetic:2")) << found.mutants[1].id;
@@ -109,13 +110,13 @@ TEST(Mutants, AreNamedByFunctionOperatorAndCount) {
 TEST(Mutants, OfCodeThatCannotRunThereAreNone) {
   const SpirvWords module =
       kernel("y[i] = x[i];", "float unused(float v) { return v * 3.0 + 1.0; }\n");
-  for (const Mutant& m : mutantsOf(module, {}).mutants)
-    EXPECT_EQ(m.place.function, "main") << m.id;
+  for (const Mutant& m : mutantsOf(module, {}).mutants) EXPECT_EQ(m.place.function, "main") << m.id;
 }
 
 // A product that nobody reads.
 TEST(Mutants, WhatAnOptimiserCannotTellIsEquivalent) {
-  const MutantSet found = mutantsOf(kernel("float a = x[i]; a = a * 1.0; y[i] = x[i];"), {"constant"});
+  const MutantSet found =
+      mutantsOf(kernel("float a = x[i]; a = a * 1.0; y[i] = x[i];"), {"constant"});
   EXPECT_EQ(found.mutants.size(), 0u);
   EXPECT_GT(found.equivalent.size(), 0u);
 }
@@ -146,15 +147,15 @@ TEST(NormalForm, TellsWhatDiffers) {
 // Two images of one type differ only in their bindings.
 TEST(NormalForm, TellsVariablesOfOneTypeApart) {
   const auto fetching = [](const char* image) {
-    return compileText(fmt::format(
-        "#version 450\n#extension GL_EXT_samplerless_texture_functions : require\n"
-        "layout(local_size_x = 1) in;\n"
-        "layout(set = 0, binding = 0) uniform texture2D a;\n"
-        "layout(set = 0, binding = 1) uniform texture2D b;\n"
-        "layout(set = 0, binding = 2, rgba32f) writeonly uniform image2D c;\n"
-        "void main() {{ imageStore(c, ivec2(0), texelFetch({}, ivec2(0), 0) + "
-        "texelFetch(a, ivec2(1), 0) * texelFetch(b, ivec2(2), 0)); }}",
-        image));
+    return compileText(
+        fmt::format("#version 450\n#extension GL_EXT_samplerless_texture_functions : require\n"
+                    "layout(local_size_x = 1) in;\n"
+                    "layout(set = 0, binding = 0) uniform texture2D a;\n"
+                    "layout(set = 0, binding = 1) uniform texture2D b;\n"
+                    "layout(set = 0, binding = 2, rgba32f) writeonly uniform image2D c;\n"
+                    "void main() {{ imageStore(c, ivec2(0), texelFetch({}, ivec2(0), 0) + "
+                    "texelFetch(a, ivec2(1), 0) * texelFetch(b, ivec2(2), 0)); }}",
+                    image));
   };
   EXPECT_NE(normalForm(fetching("a")), normalForm(fetching("b")));
 }
@@ -183,12 +184,12 @@ void main() {
 
 TEST(Mutants, MissingBarriersAndTornAtomicsAreTold) {
   const Struct word = describe<Count>("Count", field("value", &Count::value));
-  const KernelRecord record{.stage = "test",
-                            .entry = "counting",
-                            .buffers = {{"given", 0, Access::kRead, word},
-                                        {"odd", 1, Access::kWrite, word}},
-                            .push = {},
-                            .features = {"scalarBlockLayout"}};
+  const KernelRecord record{
+      .stage = "test",
+      .entry = "counting",
+      .buffers = {{"given", 0, Access::kRead, word}, {"odd", 1, Access::kWrite, word}},
+      .push = {},
+      .features = {"scalarBlockLayout"}};
   std::vector<Count> given(1024);
   for (std::size_t i = 0; i < given.size(); ++i)
     given[i].value = static_cast<uint>(i * 2654435761u >> 7);
@@ -200,9 +201,10 @@ TEST(Mutants, MissingBarriersAndTornAtomicsAreTold) {
   Gpu gpu(Gpu::Options{});
   const auto wrong = [&](const SpirvWords& module) {
     const Subject subject(gpu, record, {.words = module, .origin = "counting"});
-    const Observation seen = observe(subject, {.inputs = {{"given", std::as_bytes(std::span(given))}},
-                                               .outputs = {{"odd", given.size()}},
-                                               .extent = {given.size()}});
+    const Observation seen =
+        observe(subject, {.inputs = {{"given", std::as_bytes(std::span(given))}},
+                          .outputs = {{"odd", given.size()}},
+                          .extent = {given.size()}});
     const auto right = std::as_bytes(std::span(expected));
     return !seen.findings.empty() || !std::ranges::equal(seen.twin.at("odd"), right);
   };

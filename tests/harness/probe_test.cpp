@@ -63,7 +63,7 @@ std::string withoutProbes(std::string text) {
 
 std::uint64_t hashOfText(const fs::path& file, const std::string& text,
                          const std::map<std::string, std::string>& defines = {}) {
-  return hashWithoutDebug(
+  return normalForm(
       compileText(file, text, {.includeFolders = {file.parent_path()}, .defines = defines}));
 }
 
@@ -84,8 +84,8 @@ TEST_P(ProbeMacros, LeaveNothingInTheModuleWhenTheyAreOff) {
 INSTANTIATE_TEST_SUITE_P(Kernels, ProbeMacros,
                          testing::Values("brdf/evaluate.comp", "tonemap/resolve.comp",
                                          "post/views.comp"),
-                         [](const testing::TestParamInfo<const char*>& info) {
-                           std::string name = info.param;
+                         [](const testing::TestParamInfo<const char*>& kernel) {
+                           std::string name = kernel.param;
                            std::ranges::replace_if(
                                name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
                            return name;
@@ -165,7 +165,7 @@ TEST(Recording, TheInnermostIsToldAndTheOuterGoesOnAfterIt) {
 TEST(Recording, OneWithinAPathKeepsItsNamesAndTheExplorationItsOwn) {
   const Recording outer;
   explore([] {
-    const bool low = kOpen < 0.5f;
+    const bool low = static_cast<bool>(kOpen < 0.5f);
     const Recording inner;
     reported(Bounded(low ? 1.0f : 2.0f), "x");
     EXPECT_TRUE(is(inner.names().at("x"), low ? 1 : 2, low ? 1 : 2));
@@ -188,7 +188,7 @@ TEST(Recording, ANameThatOnePathDoesNotReachIsUncertain) {
   for (const bool reachedFirst : {true, false}) {
     const Recording recording;
     explore([&] {
-      if ((kOpen < 0.75f) == reachedFirst) reported(Bounded(3), "x");
+      if (static_cast<bool>(kOpen < 0.75f) == reachedFirst) reported(Bounded(3), "x");
       return reported(Bounded(1), "always");
     });
     EXPECT_TRUE(is(recording.names().at("x"), 3, 3, false)) << reachedFirst;
@@ -213,7 +213,7 @@ TEST(Recording, AnExplorationWithinAPathIsJoinedFirst) {
   explore([] {
     const float base = kOpen < 0.75f ? 0.0f : 10.0f;
     explore([&] {
-      const bool low = kOpen < 0.75f;
+      const bool low = static_cast<bool>(kOpen < 0.75f);
       if (low) reported(Bounded(base), "low");
       return reported(Bounded(low ? base + 1 : base + 2), "x");
     });
@@ -250,7 +250,9 @@ Struct layout() {
 constexpr Made kMade{.depth = 0.5f, .F0 = {0.25f, 0.5f, 0.75f}, .cascade = 3, .side = -2};
 
 Intermediate exactly(std::initializer_list<float> components) {
-  return {.components = {components.begin(), components.end()}};
+  Intermediate exact;
+  for (const float x : components) exact.components.push_back(Bounded(x));
+  return exact;
 }
 
 Recording::Names modelOfMade() {
@@ -305,7 +307,7 @@ TEST(Probes, WhereAllAreInsideTheFaultComesAfterThem) {
   EXPECT_EQ(firstOf(element), "");
   EXPECT_EQ(describeDivergence(element, "results[12]"),
             "At results[12] every intermediate that the kernel names is inside: the fault comes "
-            "after\nthem (depth, F0, cascade, side).\n");
+            "after them\n(depth, F0, cascade, side).\n");
 }
 
 TEST(Probes, TheFirstOutsideIsNamedWithItsComponentAndWhatIsBeforeIt) {
@@ -316,7 +318,7 @@ TEST(Probes, TheFirstOutsideIsNamedWithItsComponentAndWhatIsBeforeIt) {
   EXPECT_EQ(firstOf(element), "F0.y");
   EXPECT_EQ(describeDivergence(element, "results[12]"),
             "At results[12] it first diverges at F0.y: got 1.5 (strict twin), allowed [0.5, 0.5], "
-            "model\n0.5; the one before it is inside (depth).\n");
+            "model 0.5; the\none before it is inside (depth).\n");
 }
 
 TEST(Probes, TheEndsOfAnIntervalAreInside) {
