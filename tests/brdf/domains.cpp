@@ -96,7 +96,8 @@ std::vector<Sample> rough(std::size_t n, std::uint64_t seed) {
 }
 
 std::vector<Sample> degenerate() {
-  // The last ones: whose squares underflow or overflow, and, nearer, do not.
+  // The last four: squares of 1e-30 and 1e30 are beyond a float's 1e-38 and 3e38, of 1e-10 and 1e10
+  // within.
   const std::vector<float> special =
       specialFloats({kMinRoughness, kShortestHalf, kMinNoV, 1e-10f, 1e10f, 1e-30f, 1e30f});
   const Sample ordinary{.normal = glm::normalize(vec3(0.1f, 0.2f, 0.9f)),

@@ -96,7 +96,8 @@ TEST_F(BrdfEvaluate, EverySizeAroundAGroupIsWrittenExactly) {
 }
 
 TEST_F(BrdfEvaluateProbes, EveryProbeStaysInsideItsBound) {
-  // Enough that every branch of the kernel is taken; its results have large domains of their own.
+  // A choice: 16 groups of each domain. What probes are for, the results, has large domains of its
+  // own; and degenerate() reaches every guard.
   constexpr std::size_t kElements = 16 * std::size_t{kGroupSize};
   for (const std::vector<Sample>& samples :
        {bulk(kElements, caseSeed()), lobe(kElements, caseSeed()), grazing(kElements, caseSeed()),

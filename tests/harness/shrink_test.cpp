@@ -19,6 +19,7 @@
 #include "harness/cases/shrink.h"
 #include "harness/cases/simpler.h"
 #include "harness/error.h"
+#include "tests/scratch.h"
 
 namespace gnomon {
 namespace {
@@ -237,19 +238,8 @@ TEST(Simpler, EveryCandidateOfANumberIsSimplerSoThatChainsEnd) {
 
 class CaseFiles : public testing::Test {
  protected:
-  CaseFiles() {
-    std::string name = (std::filesystem::temp_directory_path() / "gnomon_XXXXXX").string();
-    folder = mkdtemp(name.data());
-  }
-  ~CaseFiles() override {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
-  }
-
   std::filesystem::path with(const std::string& text) const {
-    const auto file = folder / "input.json";
-    std::ofstream(file, std::ios::binary) << text;
-    return file;
+    return scratch.file("input.json", text);
   }
 
   static CaseFile example() {
@@ -269,7 +259,7 @@ class CaseFiles : public testing::Test {
     return f;
   }
 
-  std::filesystem::path folder;
+  Scratch scratch;
 };
 
 TEST_F(CaseFiles, EveryKindOfFloatComesBackToTheBit) {
@@ -283,7 +273,7 @@ TEST_F(CaseFiles, EveryKindOfFloatComesBackToTheBit) {
   for (int i = 0; i < 10'000; ++i)
     texels.emplace_back(std::bit_cast<float>(static_cast<std::uint32_t>(random())));
   f.input.images[1].picture = {.size = {static_cast<uint>(texels.size()), 1}, .texels = texels};
-  const auto file = folder / "deep/down/input.json";
+  const auto file = scratch.path() / "deep/down/input.json";
   ASSERT_TRUE(writeCaseFile(file, f));
   const CaseFile back = readCaseFile(file);
   EXPECT_TRUE(back.input == f.input);
@@ -338,8 +328,8 @@ TEST_F(CaseFiles, WhatIsNoInputIsRefusedWithTheFileAndTheReason) {
       EXPECT_LT(what.size(), 1000u);
     }
   }
-  EXPECT_THROW(readCaseFile(folder / "none.json"), UsageError);
-  EXPECT_THROW(readCaseFile(folder), UsageError);
+  EXPECT_THROW(readCaseFile(scratch.path() / "none.json"), UsageError);
+  EXPECT_THROW(readCaseFile(scratch.path()), UsageError);
 }
 
 TEST_F(CaseFiles, WhatCannotBeWrittenIsSaidSo) {
