@@ -105,7 +105,7 @@ void end(const Session& session, const CaseRecord& record) {
 }
 
 /// One case after another, in this order, until so many have failed. How much is watched to begin
-/// with is what most mutants fail by, at a quarter of the time that compiling all of it takes; what
+/// with is what most mutants fail by, at a third of the time that compiling all of it takes; what
 /// passes is watched whole.
 void runToFailures(Session& session, const std::vector<CaseName>& cases, unsigned failures,
                    const Observer& observer) {
