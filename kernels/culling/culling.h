@@ -13,13 +13,13 @@ using scene::DrawCommand;
 #endif
 
 // Lists. `frustum` and `occlusion` copy the draw of every visible candidate into `draws`, dense and
-// in input order. Where more are visible than `capacity`, the first of them are listed. Draws beyond
-// the list stay untouched: a host without vkCmdDrawIndexedIndirectCount zeroes the buffer first and
-// draws all of it.
+// in input order. Where more are visible than `capacity`, the first of them are listed. Draws
+// beyond the list stay untouched: a host without vkCmdDrawIndexedIndirectCount zeroes the buffer
+// first and draws all of it.
 struct Tally {      // of one dispatch; a host reads it some frames later
   uint tested;      // candidates
   uint total;       // of them visible
-  uint length;      // listed: min(total, capacity); the count of vkCmdDrawIndexedIndirectCount
+  uint listed;      // min(total, capacity); the count of vkCmdDrawIndexedIndirectCount
   uint overflowed;  // 1 where total > capacity, else 0
   uint recounted;   // blocks that a group counted again because nobody had answered, see `patience`
 };
@@ -36,24 +36,26 @@ struct Frustum {     // push constants
   uint patience;     // how often a group asks another one for its count before it counts itself
 };
 
-// occlusion: of the draws that frustum has listed those that are not hidden behind the depth buffer.
-// The object's sphere, grown by `pad`, has nearest depth z and covers pixels [x0, x1] x [y0, y1] of
-// the screen (clamped to it). With the smallest level L >= 0 so that 2^L >= the longer side in
-// pixels, but at most the last level, it is visible where z >= the smallest of the texels
+// occlusion: of the draws that frustum has listed those that are not hidden behind the depth
+// buffer. The object's sphere, grown by `pad`, has nearest depth z and covers pixels [x0, x1] x
+// [y0, y1] of the screen (clamped to it). With the smallest level L >= 0 so that 2^L >= the longer
+// side in pixels, but at most the last level, it is visible where z >= the smallest of the texels
 // (min(x >> L, width - 1), min(y >> L, height - 1)) of the four corners, level 0 being the depth
-// buffer itself. A sphere that reaches nearer than the near plane is visible.
+// buffer itself. A sphere that reaches nearer than the near plane is visible, and one so far to the
+// side that x or y below exceeds kSteepest.
 // The rectangle and z, in this arrangement (Mara and McGuire 2013, scaled by the distance d of the
 // centre along the view axis; perspective; c is the centre in view space):
 //   x = |c.x| / d, rho = r / d, t = sqrt(x^2 + (1 - rho) (1 + rho)), 1 - rho = (d - r) / d
 //   far side  (t x + rho) (t + rho x) / ((1 - rho) (1 + rho) (1 + x^2)),
 //   near side (t x - rho) / (t + rho x), as slopes c.x / d, mirrored where c.x < 0
+// Orthographic: c.x -+ r, and z at d - r in both.
 // Bad input: as of frustum; a draw whose firstInstance is no object is visible.
-struct Occlusion {   // push constants
-  uvec2 size;        // of the depth buffer, pixels
-  uint objects;      // of bounds
-  uint candidates;   // that `survivors` holds; the frustum's tally says how many there are
-  uint capacity;     // of draws
-  float pad;         // as of frustum
+struct Occlusion {  // push constants
+  uvec2 size;       // of the depth buffer, pixels
+  uint objects;     // of bounds
+  uint candidates;  // that `survivors` holds; the frustum's tally says how many there are
+  uint capacity;    // of draws
+  float pad;        // as of frustum
   uint patience;
 };
 
@@ -72,15 +74,18 @@ struct HizLevel {  // push constants
   uvec2 size;      // of the parent, pixels
 };
 
+const float kSteepest = 1048576.0f;            // 2^20
 const float kMostWorld = 1125899906842624.0f;  // 2^50: its squares are far from overflow
 
 const uint kGroupSize = 64;  // threads of frustum and occlusion
 const uint kBlock = 1024;    // candidates that one group counts
 
 // Scratch of frustum and occlusion, zero before and after a dispatch: kBlocks + one a block.
-const uint kTicket = 0;    // blocks taken so far
-const uint kFinished = 1;  // groups that are done
-const uint kBlocks = 2;    // from here on for each block its count + 1, 0: not counted yet
+const uint kTicket = 0;     // blocks taken so far
+const uint kFinished = 1;   // groups that are done
+const uint kTotal = 2;      // visible candidates, said by whoever has the last block
+const uint kRecounted = 3;  // blocks counted again
+const uint kBlocks = 4;     // from here on for each block its count + 1, 0: not counted yet
 
 const uint kCamera = 0;  // binding numbers of frustum, set 0
 const uint kBounds = 1;

@@ -1,0 +1,5 @@
+// Entry culling/frustum.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "frustum.glsl"
