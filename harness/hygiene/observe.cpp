@@ -32,6 +32,13 @@ std::string where(const Output& out, std::size_t byte) {
   return where(out.place(byte / out.layout.size), out.layout, byte);
 }
 
+/// Whether the contract has a word of an element depend on timing.
+bool varies(const Struct& layout, std::size_t word) {
+  return std::ranges::any_of(layout.fields, [&](const Field& f) {
+    return f.varies && word * kWord >= f.offset && word * kWord < f.offset + f.scalars * kWord;
+  });
+}
+
 /// Words that differ, how many and the first; two results have the same length.
 struct Difference {
   std::size_t words = 0, first = 0;
@@ -53,7 +60,7 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
     if (a == b) continue;
     const bool poisoned = a == out.poisoned(kPoison[0], i % perElement) &&
                           b == out.poisoned(kPoison[1], i % perElement);
-    (poisoned ? unwritten : differing).note(i);
+    if (poisoned || !varies(out.layout, i % perElement)) (poisoned ? unwritten : differing).note(i);
   }
   if (unwritten.words > 0 && !out.list)
     findings.push_back(fmt::format("the {} left {} of {} words of '{}' unwritten, first {}", module,
@@ -114,7 +121,9 @@ class Observer {
       const Bytes& first = seen.twin.at(out.name);
       Difference differing;
       for (std::size_t i = 0; i < first.size() / kWord; ++i)
-        if (wordAt(first, i) != wordAt(other.outputs[o], i)) differing.note(i);
+        if (wordAt(first, i) != wordAt(other.outputs[o], i) &&
+            !varies(out.layout, i % (out.layout.size / kWord)))
+          differing.note(i);
       if (differing.words > 0)
         seen.findings.push_back(fmt::format("{}, {} of {} words of '{}' differ, first {}: {}",
                                             arrangement, differing.words, first.size() / kWord,

@@ -29,6 +29,7 @@ struct Field {
   unsigned scalars = 0;     ///< number of 32-bit scalars
   bool signOfZero = false;  ///< the contract fixes the sign of a zero
   std::string meaning{};    ///< what a convention may change: "roughness", "depth"
+  bool varies = false;      ///< from run to run: judged, but two runs need not agree on it
 
   /// Of one of its scalars: "D", "F.y", "view[12]".
   std::string scalarName(unsigned component) const;
@@ -51,6 +52,7 @@ struct FieldOf {
   M S::*member;
   bool signOfZero = false;
   std::string meaning{};
+  bool varies = false;
 };
 
 template <class S, class M>
@@ -68,6 +70,12 @@ FieldOf<S, M> field(std::string name, M S::*member, std::string meaning) {
 template <class M>
 Field typeOfMember();
 
+/// A field that depends on timing (Field::varies).
+template <class S, class M>
+FieldOf<S, M> varyingField(std::string name, M S::*member) {
+  return {.name = std::move(name), .member = member, .varies = true};
+}
+
 template <class S, class... M>
 Struct describe(std::string name, FieldOf<S, M>... members) {
   Struct result{std::move(name), sizeof(S), {}};
@@ -77,6 +85,7 @@ Struct describe(std::string name, FieldOf<S, M>... members) {
     f.name = m.name;
     f.signOfZero = m.signOfZero;
     f.meaning = m.meaning;
+    f.varies = m.varies;
     f.offset = static_cast<unsigned>(reinterpret_cast<const std::byte*>(&(object.*m.member)) -
                                      reinterpret_cast<const std::byte*>(&object));
     result.fields.push_back(std::move(f));

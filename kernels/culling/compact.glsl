@@ -31,8 +31,8 @@ uint countAgain(uint block, uint candidates) {
   return count;
 }
 
-uint countOf(uint block, uint candidates, uint patience) {
-  for (uint i = 0; i < patience; ++i) {
+uint countOf(uint block, uint candidates, inout uint patience) {
+  for (; patience > 0; --patience) {
     const uint answer = atomicOr(scratch[kBlocks + block], 0u);
     if (answer != 0) return answer - 1;
   }

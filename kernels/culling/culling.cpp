@@ -33,7 +33,7 @@ Struct draw() {
 Struct tally() {
   return describe<Tally>("Tally", field("tested", &Tally::tested), field("total", &Tally::total),
                          field("listed", &Tally::listed), field("overflowed", &Tally::overflowed),
-                         field("recounted", &Tally::recounted));
+                         varyingField("recounted", &Tally::recounted));
 }
 
 struct Word {
@@ -47,7 +47,10 @@ std::array<uint, 3> aGroupForEveryBlock(const Extent& candidates) {
 
 /// What both have, and where the candidates' draws come from.
 KernelRecord lister(std::string entry, const char* source, unsigned sourceBinding) {
-  KernelRecord record{.order = 3, .stage = "culling", .entry = std::move(entry)};
+  KernelRecord record{};
+  record.order = 3;
+  record.stage = "culling";
+  record.entry = std::move(entry);
   record.file = "culling/" + record.entry + ".comp";
   record.buffers = {
       {.name = "camera", .binding = kCamera, .element = camera()},

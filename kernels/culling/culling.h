@@ -21,7 +21,7 @@ struct Tally {      // of one dispatch; a host reads it some frames later
   uint total;       // of them visible
   uint listed;      // min(total, capacity); the count of vkCmdDrawIndexedIndirectCount
   uint overflowed;  // 1 where total > capacity, else 0
-  uint recounted;   // blocks that a group counted again because nobody had answered, see `patience`
+  uint recounted;   // blocks that were counted again because nobody answered in time
 };
 
 // frustum: a candidate is visible unless its sphere, grown by `pad`, lies wholly outside one plane;
@@ -33,7 +33,7 @@ struct Frustum {     // push constants
   uint capacity;     // of draws
   uint noNearPlane;  // 1: casters of shadows count though they lie before the near plane
   float pad;         // world units, >= 0, added to every radius: makes up for rounding (camera.h)
-  uint patience;     // how often a group asks another one for its count before it counts itself
+  uint patience;     // see kPatience
 };
 
 // occlusion: of the draws that frustum has listed those that are not hidden behind the depth
@@ -56,7 +56,7 @@ struct Occlusion {  // push constants
   uint candidates;  // that `survivors` holds; the frustum's tally says how many there are
   uint capacity;    // of draws
   float pad;        // as of frustum
-  uint patience;
+  uint patience;    // see kPatience
 };
 
 // hiz: the pyramid of farthest depths. Level 0 is the depth buffer; level L has max(1, floor(w /
@@ -79,6 +79,11 @@ const float kMostWorld = 1125899906842624.0f;  // 2^50: its squares are far from
 
 const uint kGroupSize = 64;  // threads of frustum and occlusion
 const uint kBlock = 1024;    // candidates that one group counts
+
+// How often a thread asks other groups for their counts in vain, in all, before it counts for
+// itself; 0 asks nobody. Mesa's llvmpipe ends every loop of a thread that has made 65,535 passes
+// through loops, so it stays well below.
+const uint kPatience = 20000;
 
 // Scratch of frustum and occlusion, zero before and after a dispatch: kBlocks + one a block.
 const uint kTicket = 0;     // blocks taken so far

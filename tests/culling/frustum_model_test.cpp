@@ -75,7 +75,7 @@ dvec3 normalOf(const Face& face) {
 
 template <class F>
 void forEachScene(const F& f) {
-  const std::size_t count = generated("cullingScenes");
+  const std::size_t count = scenesOfEachKind();
   for (int kind = 0; kind < kSceneKinds; ++kind)
     for (std::size_t i = 0; i < count; ++i)
       f(generatedScene(static_cast<SceneKind>(kind), caseSeed() + i));
@@ -181,7 +181,7 @@ TEST(CullingFrustumModel, BadBoundsAreVisible) {
   for (const float x : specialFloats({kMostWorld, -kMostWorld, 2 * kMostWorld})) {
     const bool usable = std::abs(x) <= kMostWorld;
     EXPECT_EQ(visible(camera, {{x, 50, -5}, 1}), !usable) << x;
-    EXPECT_EQ(visible(camera, {{50, x, -5}, 1}), !usable || std::abs(x) < 9) << x;
+    EXPECT_EQ(visible(camera, {{50, x, -5}, 1}), !usable) << x;
     EXPECT_EQ(visible(camera, {{50, 0, x}, 1}), !usable) << x;
     EXPECT_EQ(visible(camera, {{50, 0, -5}, x}), !(usable && x >= 0) || x > 48) << x;
   }

@@ -39,7 +39,7 @@ Occlusion pushFor(const Scene& scene) {
           .candidates = n,
           .capacity = n,
           .pad = scene.pad,
-          .patience = ~0u};
+          .patience = kPatience};
 }
 
 bool visible(const Scene& scene, const Bounds& sphere, const Pyramid& pyramid) {
@@ -151,7 +151,7 @@ TEST(CullingOcclusionModel, AQuerySeesItsPixelsAndNotManyMore) {
 }
 
 TEST(CullingOcclusionModel, NothingThatARaySeesIsHidden) {
-  forEachScene(generated("cullingScenes"), [](const Scene& scene) {
+  forEachScene(scenesOfEachKind(), [](const Scene& scene) {
     const Pyramid pyramid = pyramidOf(scene.depth);
     for (std::size_t i = 0; i < scene.things.size(); ++i)
       EXPECT_TRUE(!scene.seen[i] || visible(scene, scene.bounds[i], pyramid))
@@ -260,7 +260,7 @@ double hiddenShare(SceneKind kind, std::size_t scenes) {
 // change of the rules shows.
 TEST(CullingOcclusionModel, TheShareOfHiddenThingsFoundIsAsRecorded) {
   const auto recorded = Session::current().policy()["cullingHiddenShare"];
-  const double share = hiddenShare(SceneKind::kOccluders, generated("cullingScenes"));
+  const double share = hiddenShare(SceneKind::kOccluders, scenesOfEachKind());
   EXPECT_NEAR(share, recorded, 0.02);
 }
 

@@ -10,6 +10,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 
+#include "harness/cases/kernel_case.h"
 #include "harness/cases/random.h"
 #include "kernels/culling/camera.h"
 
@@ -267,6 +268,10 @@ const char* nameOf(SceneKind kind) {
                                  "occluders", "crossing", "inside",   "transformed",
                                  "huge",      "tiny",     "infinite", "orthographic"};
   return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::size_t scenesOfEachKind() {
+  return (generated("cullingScenes") + kSceneKinds - 1) / kSceneKinds;
 }
 
 std::vector<DrawCommand> commandsFor(std::size_t objects) {

@@ -57,6 +57,9 @@ struct Scene {
   bool perspective() const { return projection[2][3] != 0; }
 };
 
+/// Of the policy's number, or that of --cases, which are generated.
+std::size_t scenesOfEachKind();
+
 /// The same for the same kind and seed.
 Scene generatedScene(SceneKind kind, std::uint64_t seed);
 
