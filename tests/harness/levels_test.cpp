@@ -3,7 +3,7 @@
 // Covered: where each level's pixels are, before and after a narrow format, with levels that are
 // forgotten and levels in each other's place; descriptors past the last level; rows from below; the
 // length of the array in the contract and in a shader, ours or foreign; devices with too few
-// descriptors.
+// descriptors, or without what a capability asks for.
 // Not covered: dynamic indices into the array, layers with mip levels, which no output has; images
 // that are read while written.
 #include "harness/hygiene/levels.h"
@@ -212,6 +212,22 @@ TEST_F(MipLevels, TheLengthOfTheArrayIsTheContracts) {
             "'pyramid' is an array of 7 in the shader, an array of 6 in the contract");
   EXPECT_EQ(refusal(*gpu, 1, 4, Adapter{}),
             "'pyramid' is an array of 4 in the shader, one image in the contract");
+}
+
+// glslang does not declare the capability of dynamic indices; other compilers do.
+TEST_F(MipLevels, WhatACapabilityAsksOfTheDeviceIsUnsupportedWhereItIsMissing) {
+  const char* const feature = "shaderStorageImageArrayDynamicIndexing";
+  constexpr std::uint32_t kOpCapability = 2 << 16 | 17, kStorageImageArrayDynamicIndexing = 31;
+  SpirvWords declaring = writer(kStore);
+  declaring.insert(declaring.begin() + 5,  // behind the header
+                   {kOpCapability, kStorageImageArrayDynamicIndexing});
+  try {
+    expectEveryLevel(observed(declaring));
+    EXPECT_TRUE(gpu->info().features.at(feature));
+  } catch (const Unsupported& why) {
+    EXPECT_EQ(why.what(), fmt::format("{} lacks {}", gpu->info().name, feature));
+    EXPECT_FALSE(gpu->info().features.at(feature));
+  }
 }
 
 TEST_F(MipLevels, ADeviceWithTooFewDescriptorsIsUnsupported) {
