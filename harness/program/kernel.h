@@ -85,7 +85,13 @@ Struct describe(std::string name, FieldOf<S, M>... members) {
   return result;
 }
 
-enum class Access { kRead, kWrite };
+enum class Access {
+  kRead,
+  kWrite,
+  /// Memory of a kernel's own, which it reads and writes: zero before a dispatch, and zero again
+  /// after it, for the next frame starts from there. No output.
+  kScratch,
+};
 
 /// A storage buffer whose elements are one contract struct.
 struct BufferSpec {
