@@ -30,11 +30,23 @@ uint leftTap(uint side, uint64_t base, uint64_t a) {
 }  // namespace
 
 Lookup lookupNamed(std::string_view name) {
-  if (name == "pinned") return Lookup::kPinned;
-  if (name == "fold3") return Lookup::kFold3;
-  if (name == "next_pow2") return Lookup::kNextPow2;
-  if (name == "previous_pow2") return Lookup::kPreviousPow2;
+  for (const Lookup lookup :
+       {Lookup::kPinned, Lookup::kFold3, Lookup::kNextPow2, Lookup::kPreviousPow2})
+    if (name == nameOf(lookup)) return lookup;
   throw std::logic_error("no lookup is called " + std::string(name));
+}
+
+const char* nameOf(Lookup lookup) {
+  switch (lookup) {
+    case Lookup::kFold3:
+      return "fold3";
+    case Lookup::kNextPow2:
+      return "next_pow2";
+    case Lookup::kPreviousPow2:
+      return "previous_pow2";
+    default:
+      return "pinned";
+  }
 }
 
 uint LookupAxis::size(uint element) const {

@@ -26,6 +26,7 @@ enum class Lookup { kPinned, kFold3, kNextPow2, kPreviousPow2 };
 
 /// By an adapter's name of it. Programmer error for another one.
 Lookup lookupNamed(std::string_view name);
+const char* nameOf(Lookup lookup);
 
 /// One axis of a pyramid. Elements are those of the contract's `levels`.
 struct LookupAxis {
