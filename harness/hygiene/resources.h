@@ -100,6 +100,8 @@ class Resources {
   void addOutputImage(const OutputImage& output, Target target);
   void bind();
   void bindImages();
+  void uploadImages();
+  void poisonImages(std::uint32_t poison);
   void poisonOutputs(std::uint32_t poison);
   void checkGuards(const Memory& memory, const Bytes& whole, std::uint32_t poison,
                    std::vector<std::string>& strays) const;
