@@ -33,7 +33,8 @@ const bool whole = registerKernel({
                 .binding = kHizLevels,
                 .access = Access::kWrite,
                 .type = "image2D",
-                .format = PixelFormat::kR32f/*D*/}},
+                .format = PixelFormat::kR32f,
+                .descriptors = kMaxLevels}},
     .push = describe<Hiz>("Hiz", field("size", &Hiz::size)),
     .grid = [](const Extent& depth) -> std::array<uint, 3> {
       return {tilesOf(depth.width), tilesOf(depth.height), 1};

@@ -17,8 +17,13 @@ std::span<const std::byte> bytesOf(const std::vector<float>& depths) {
   return std::as_bytes(std::span(depths));
 }
 
+struct Place {
+  uint element;
+  uvec2 texel;
+};
+
 /// What one texel may be. Exact where it saw just what it had to.
-Bounded allowed(const DepthBuffer& depths, const PyramidShape& shape, const Texels::Place& at) {
+Bounded allowed(const DepthBuffer& depths, const PyramidShape& shape, const Place& at) {
   const Footprint own = shape.own(at.element, at.texel), most = shape.most(at.element, at.texel);
   Bounded result;
   result.hi = own.empty() ? kInfinite : farthest<double>(depths, own);
@@ -28,8 +33,7 @@ Bounded allowed(const DepthBuffer& depths, const PyramidShape& shape, const Texe
   return result;
 }
 
-std::string describe(const DepthBuffer& depths, const PyramidShape& shape,
-                     const Texels::Place& at) {
+std::string describe(const DepthBuffer& depths, const PyramidShape& shape, const Place& at) {
   const Footprint f = shape.own(at.element, at.texel);
   std::string text =
       fmt::format("    level   {}, texel ({}, {})\n    covers  columns {} to {}, rows {} to {}\n",
@@ -120,49 +124,36 @@ DepthBuffer depthsOf(const Picture& picture) {
   return buffer;
 }
 
-Texels::Texels(const PyramidShape& shape, uint firstElement, uint endElement)
-    : first(firstElement) {
-  for (uint element = firstElement; element < endElement; ++element) {
-    sizes.push_back(shape.size(element));
-    starts.push_back(starts.back() + std::size_t{sizes.back().x} * sizes.back().y);
-  }
-}
-
-Texels::Place Texels::operator[](std::size_t i) const {
-  const auto next = std::ranges::upper_bound(starts, i);
-  const auto element = static_cast<std::size_t>(next - starts.begin()) - 1;
-  const std::size_t local = i - starts[element];
-  const uint width = sizes[element].x;
-  return {first + static_cast<uint>(element),
-          {static_cast<uint>(local % width), static_cast<uint>(local / width)}};
-}
-
-unsigned Texels::width() const { return sizes.size() == 1 ? sizes.front().x : 0; }
-
 Lookup PyramidCase::lookup() const {
   const auto& conventions = Session::current().subject(kernelName).conventions();
   const auto said = conventions.find("lookup");
   return said == conventions.end() ? Lookup::kPinned : lookupNamed(said->second);
 }
 
-Expectation PyramidCase::modelOf(const std::string& output, DepthBuffer buffer, uint firstElement,
-                                 uint endElement) const {
+Expectation PyramidCase::modelOf(const std::string& output, DepthBuffer buffer, uint first,
+                                 uint elements) const {
   const PyramidShape shape = shapeOf(buffer.size);
-  const Texels texels(shape, firstElement, endElement);
+  const Levels levels{shape.size(first).x, shape.size(first).y, elements};
   const auto depths = std::make_shared<const DepthBuffer>(std::move(buffer));
+  const auto placeOf = [=](std::size_t i) -> Place {
+    const LevelPixel pixel = pixelAt(levels, i);
+    return {first + pixel.level, {pixel.x, pixel.y}};
+  };
   Expectation e;
   e.output = output;
-  e.elements = texels.count();
-  e.width = texels.width();
+  e.elements = gnomon::pixelsOf(levels);
+  e.width = levels.width;
+  e.height = levels.height;
+  e.mips = levels.count;
   // The interval is what a texel may have seen: it says nothing of arithmetic.
   e.judgesRules = lookup() != Lookup::kPinned;
   e.plain = [=](std::size_t i, std::span<double> out) {
-    out[0] = allowed(*depths, shape, texels[i]).value;
+    out[0] = allowed(*depths, shape, placeOf(i)).value;
   };
   e.bounded = [=](std::size_t i, std::span<Bounded> out) {
-    out[0] = allowed(*depths, shape, texels[i]);
+    out[0] = allowed(*depths, shape, placeOf(i));
   };
-  e.inputs = [=](std::size_t i) { return describe(*depths, shape, texels[i]); };
+  e.inputs = [=](std::size_t i) { return describe(*depths, shape, placeOf(i)); };
   return e;
 }
 
@@ -178,6 +169,55 @@ Observation PyramidCase::runWith(Effort effort, const Stimulus& stimulus) {
   seen.twin = runTwinOnce(Session::current().subject(kernelName), stimulus);
   seen.plain = seen.twin;
   return seen;
+}
+
+Observation HizCase::dispatch(const DepthBuffer& depths, Effort effort, PixelFormat format) {
+  const PyramidShape shape = shapeOf(depths.size);
+  const Hiz push{depths.size};
+  const uvec2 tiles = levelSize(depths.size, kHizTile);
+  return runWith(effort, {.scratch = {{"scratch", 1 + std::size_t{tiles.x} * tiles.y}},
+                          .inputImages = {{.image = "depth",
+                                           .description = {.format = format,
+                                                           .width = depths.size.x,
+                                                           .height = depths.size.y},
+                                           .texels = bytesOf(depths.depths)}},
+                          .outputImages = {{.image = "levels",
+                                            .width = shape.size(0).x,
+                                            .height = shape.size(0).y,
+                                            .mips = shape.elements()}},
+                          .push = std::as_bytes(std::span(&push, 1)),
+                          .extent = {depths.size.x, depths.size.y}});
+}
+
+Expectation HizCase::modelOfAll(DepthBuffer depths) const {
+  const uint elements = shapeOf(depths.size).elements();
+  return modelOf("levels", std::move(depths), 0, elements);
+}
+
+void HizCase::expectEveryTexel(const DepthBuffer& buffer) {
+  expectConformsOn(HizInput{{buffer.size}, pictureOf(buffer)}, [this](HizInput& input) {
+    const DepthBuffer depths = depthsOf(input.depth);
+    return Trial{dispatch(depths), modelOfAll(depths)};
+  });
+}
+
+void HizCase::expectEveryTexelAtOnce(const DepthBuffer& depths) {
+  expectConforms(dispatch(depths, Effort::kOnce), modelOfAll(depths));
+}
+
+Pyramid HizCase::pyramidOf(const DepthBuffer& depths) {
+  const PyramidShape shape = shapeOf(depths.size);
+  const Observation seen = dispatch(depths);
+  expectClean(seen);
+  const std::vector<float> all = elementsOf<float>(seen.twin.at("levels"));
+  Pyramid pyramid;
+  auto at = all.begin();
+  for (uint element = 0; element < shape.elements(); ++element) {
+    const auto count = static_cast<std::ptrdiff_t>(shape.size(element).x) * shape.size(element).y;
+    pyramid.emplace_back(at, at + count);
+    at += count;
+  }
+  return pyramid;
 }
 
 Observation HizLevelCase::dispatch(const DepthBuffer& parent, const uvec2& size, Effort effort,
@@ -207,7 +247,7 @@ void HizLevelCase::expectEveryTexelOfTheChain(const DepthBuffer& depths, Effort 
   for (uint element = 0; element < shape.elements(); ++element) {
     const uvec2 size = shape.size(element);
     const Observation seen = dispatch(parent, size, effort);
-    expectConforms(seen, modelOf("level", depths, element, element + 1));
+    expectConforms(seen, modelOf("level", depths, element, 1));
     parent = {size, elementsOf<float>(seen.twin.at("level"))};
   }
   EXPECT_EQ(parent.size, uvec2(1));

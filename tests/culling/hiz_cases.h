@@ -44,26 +44,6 @@ void parts(Parts& p, LevelInput& input);
 Picture pictureOf(const DepthBuffer& buffer);
 DepthBuffer depthsOf(const Picture& picture);
 
-/// The texels of some elements of a pyramid, one after the other.
-class Texels {
- public:
-  Texels(const PyramidShape& shape, uint firstElement, uint endElement);
-
-  struct Place {
-    uint element;
-    uvec2 texel;
-  };
-  Place operator[](std::size_t i) const;
-  std::size_t count() const { return starts.back(); }
-  /// Of a row, where they are of one element; else 0.
-  unsigned width() const;
-
- private:
-  uint first;
-  std::vector<uvec2> sizes{};
-  std::vector<std::size_t> starts{0};  ///< of each element, and the end
-};
-
 /// How much a run is watched: a big one was watched as a small one.
 enum class Effort { kWatched, kOnce };
 
@@ -79,7 +59,7 @@ class PyramidCase : public KernelCase {
   /// is addressed otherwise than ours, farther than none that a query finds there, and not farther
   /// than all that it may have seen.
   Expectation modelOf(const std::string& output, DepthBuffer depths, uint firstElement,
-                      uint endElement) const;
+                      uint elements) const;
 
   /// Runs the kernel, or its chain. Hygiene's findings fail the case.
   virtual Pyramid pyramidOf(const DepthBuffer& depths) = 0;
@@ -108,6 +88,8 @@ class HizCase : public PyramidCase {
                        PixelFormat format = PixelFormat::kR32f);
   Expectation modelOfAll(DepthBuffer depths) const;
   void expectEveryTexel(const DepthBuffer& depths);
+  /// Of a big one.
+  void expectEveryTexelAtOnce(const DepthBuffer& depths);
   Pyramid pyramidOf(const DepthBuffer& depths) override;
 };
 
