@@ -8,6 +8,7 @@
 #include "harness/cases/kernel_case.h"
 #include "harness/cases/probes.h"
 #include "harness/cases/shrink.h"
+#include "harness/hygiene/levels.h"
 
 namespace gnomon {
 namespace {
@@ -126,7 +127,10 @@ uvec2 focusOf(const Trial& trial, const Verdict& v) {
   if (worst == nullptr) return {0, 0};
   const unsigned width = trial.expected.width;
   if (width == 0) return {worst->element, 0};
-  return {worst->element % width, worst->element / width};
+  if (trial.expected.mips == 1) return {worst->element % width, worst->element / width};
+  const LevelPixel at =
+      pixelAt({width, trial.expected.height, trial.expected.mips}, worst->element);
+  return {at.x << at.level, at.y << at.level};  // the first of the pixels that it is made of
 }
 
 std::string whatItDoes(const Failure& f) {

@@ -13,6 +13,7 @@
 #include "harness/cases/generated.h"
 #include "harness/cases/picture.h"
 #include "harness/cases/session.h"
+#include "harness/hygiene/levels.h"
 #include "harness/hygiene/observe.h"
 #include "harness/verdict/verdict.h"
 #include "reference/bound/explore.h"
@@ -159,6 +160,16 @@ template <class Model, class Describe>
 Expectation pixelsOf(std::string image, const uvec2& size, Model model, Describe inputs) {
   Expectation e = expectationOf(std::move(image), std::size_t{size.x} * size.y, model, inputs);
   e.width = size.x;
+  return e;
+}
+
+/// The same for an image with mip levels, one level after the other.
+template <class Model, class Describe>
+Expectation levelsOf(std::string image, const Levels& levels, Model model, Describe inputs) {
+  Expectation e = expectationOf(std::move(image), pixelsOf(levels), model, inputs);
+  e.width = levels.width;
+  e.height = levels.height;
+  e.mips = levels.count;
   return e;
 }
 

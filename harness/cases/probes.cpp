@@ -10,6 +10,7 @@
 
 #include "harness/cases/session.h"
 #include "harness/error.h"
+#include "harness/hygiene/levels.h"
 
 namespace gnomon {
 namespace {
@@ -77,6 +78,12 @@ std::size_t probeIndex(const Subject& subject, const Expectation& expected,
                        const Stimulus& stimulus, std::size_t element) {
   const auto y = subject.conventions().find("y");
   if (expected.width == 0 || y == subject.conventions().end() || y->second != "up") return element;
+  if (expected.mips > 1) {
+    const Levels image{expected.width, expected.height, expected.mips};
+    const LevelPixel at = pixelAt(image, element);
+    const auto [width, rows] = mipSize({.width = image.width, .height = image.height}, at.level);
+    return element - std::size_t{at.y} * width + std::size_t{rows - 1 - at.y} * width;
+  }
   const std::size_t height = stimulus.outputImages.front().height;
   const std::size_t x = element % expected.width, row = element / expected.width;
   const std::size_t layer = row / height;
@@ -122,11 +129,6 @@ class ProbedRuns {
   std::map<std::string, Bytes> first, second;
 };
 
-std::string placeIn(const Expectation& e, std::size_t element) {
-  if (e.width == 0) return fmt::format("{}[{}]", e.output, element);
-  return fmt::format("{}({}, {})", e.output, element % e.width, element / e.width);
-}
-
 std::string firstDivergenceOrThrow(const std::string& kernel, const Observation& seen,
                                    const Expectation& expected, const Rules& rules,
                                    std::size_t element) {
@@ -137,7 +139,7 @@ std::string firstDivergenceOrThrow(const std::string& kernel, const Observation&
   const ProbedRuns runs(*subject, seen, expected);
   session.cameFurther();
   std::string text = describeDivergence(runs.at(element, recorded(expected, rules, element)),
-                                        placeIn(expected, element));
+                                        expected.place(element));
   if (!runs.repeats(seen, element))
     text += inLines(
         "(With probes its results differ from those that were judged: what the compiler makes of "
@@ -252,7 +254,7 @@ std::vector<std::string> divergences(const std::string& kernel, const Observatio
   for (std::size_t i = 0; i < expected.elements && found.size() < most; ++i) {
     const std::vector<ProbedScalar> element = runs.at(i, recorded(expected, rules, i));
     if (firstDiverging(element) != nullptr)
-      found.push_back(describeDivergence(element, placeIn(expected, i)));
+      found.push_back(describeDivergence(element, expected.place(i)));
   }
   return found;
 }

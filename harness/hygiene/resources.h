@@ -33,7 +33,7 @@ struct Output {
   std::string name{};
   Struct layout{};
   std::size_t elements = 0;
-  unsigned width = 0;  ///< pixels in a row; 0: a buffer
+  unsigned width = 0;  ///< pixels in a row of the largest level; 0: a buffer
   GpuImage image{};
   std::string meaning{};      ///< as ImageSpec's
   std::vector<bool> given{};  ///< by word of an element: whether the module gives it at all
@@ -44,7 +44,8 @@ struct Output {
   std::size_t dataBytes() const { return elements * layout.size; }
   /// What a word of an unwritten element reads as after a fill with the pattern.
   std::uint32_t poisoned(std::uint32_t pattern, std::size_t word) const;
-  /// "results[12]" or "target(3, 5)"; of an image with layers "target(3, 5, 1)".
+  /// "results[12]" or "target(3, 5)"; of an image with layers "target(3, 5, 1)", of one with mip
+  /// levels "target level 1 (3, 5)".
   std::string place(std::size_t element) const;
 };
 

@@ -1,10 +1,14 @@
 // The images of a stimulus: in the record's format or wider, up to the device and down again.
 #include "harness/hygiene/resources.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <stdexcept>
 
 #include <fmt/format.h>
+
+#include "harness/hygiene/levels.h"
 
 namespace gnomon {
 namespace {
@@ -94,6 +98,8 @@ std::string Output::place(std::size_t element) const {
   if (!isImage()) return fmt::format("{}[{}]", name, element);
   const ImageDescription& pixels = image.description();
   const std::size_t x = element % width, row = element / width;
+  if (pixels.mips > 1)
+    return placeOn(name, pixelAt({pixels.width, pixels.height, pixels.mips}, element));
   if (pixels.layers == 1) return fmt::format("{}({}, {})", name, x, row);
   return fmt::format("{}({}, {}, {})", name, x, row % pixels.height, row / pixels.height);
 }
@@ -109,17 +115,24 @@ void Resources::addInputImage(const InputImage& input) {
 
 void Resources::addOutputImage(const OutputImage& output, Target target) {
   const ImageSpec& spec = record.image(output.image);
+  if (output.layers > 1 && output.mips > 1)
+    throw std::logic_error(
+        fmt::format("'{}' has {} layers and {} mip levels; an output has one or "
+                    "the other",
+                    output.image, output.layers, output.mips));
   const bool narrow = target == Target::kContract && isNarrow(spec.format);
   const bool fromBelow = conventions.contains("y") && conventions.at("y") == "up";
-  const unsigned beyond = output.layers == 1 && !fromBelow ? output.beyond : 0;
+  const bool single = output.layers == 1 && output.mips == 1;
+  const unsigned beyond = single && !fromBelow ? output.beyond : 0;
   const ImageDescription description{
       .format = target == Target::kContract ? spec.format : widened(spec.format),
       .width = output.width + beyond,
       .height = output.height + beyond,
-      .layers = output.layers};
+      .layers = output.layers,
+      .mips = output.mips};
   Output o{.name = narrow ? narrowName(spec) : spec.name,
            .layout = pixelLayout(spec.format),
-           .elements = std::size_t{output.width} * output.height * output.layers,
+           .elements = output.layers * pixelsOf({output.width, output.height, output.mips}),
            .width = output.width,
            .meaning = spec.meaning,
            .given = {}};
@@ -200,15 +213,17 @@ Bytes Resources::cropped(const Output& output, Bytes texels, std::uint32_t poiso
 
 Bytes Resources::downloadImage(const Output& output) const {
   const ImageDescription& image = output.image.description();
-  const std::size_t layerBytes = mipBytes(image, 0);
-  Bytes texels(layerBytes * image.layers);
-  for (unsigned layer = 0; layer < image.layers; ++layer) {
-    const auto rows = std::span(texels).subspan(layer * layerBytes, layerBytes);
-    gpu.downloadImage(output.image, layer, 0, rows);
-    const Bytes ours =
-        inConvention(rows, image.format, image.height, output.meaning, conventions, Way::kOut);
-    std::ranges::copy(ours, rows.begin());
-  }
+  Bytes texels(bytesOf(image));
+  std::size_t at = 0;
+  for (unsigned layer = 0; layer < image.layers; ++layer)
+    for (unsigned mip = 0; mip < image.mips; ++mip) {
+      const auto rows = std::span(texels).subspan(at, mipBytes(image, mip));
+      gpu.downloadImage(output.image, layer, mip, rows);
+      const Bytes ours = inConvention(rows, image.format, mipSize(image, mip)[1], output.meaning,
+                                      conventions, Way::kOut);
+      std::ranges::copy(ours, rows.begin());
+      at += rows.size();
+    }
   return widen(std::move(texels), image.format);
 }
 

@@ -30,13 +30,16 @@ struct InputImage {
   std::span<const std::byte> texels{};
 };
 
-/// Of the record's format; one mip level.
+/// Of the record's format. Its elements are the pixels of all layers, or of all mip levels from the
+/// largest on; one of layers and mips is 1.
 struct OutputImage {
   std::string image{};
   unsigned width = 1, height = 1, layers = 1;
   /// Pixels that the image is wider and higher than what is to be written: they stay as they are.
-  /// Of an image without layers; left out where a foreign kernel counts rows from below.
+  /// Of an image of one layer and mip level; left out where a foreign kernel counts rows from
+  /// below.
   unsigned beyond = 0;
+  unsigned mips = 1;
 };
 
 struct Stimulus {

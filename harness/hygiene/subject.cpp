@@ -1,6 +1,8 @@
 #include "harness/hygiene/subject.h"
 
 #include <algorithm>
+#include <string_view>
+#include <utility>
 
 #include "harness/error.h"
 #include "harness/program/order.h"
@@ -13,6 +15,32 @@ bool readsWhatItWrites(const Reflection& reflection) {
   return std::ranges::any_of(reflection.bindings, [](const ReflectedBinding& b) {
     return b.kind.starts_with("storage") && !b.readOnly && !b.writeOnly;
   });
+}
+
+/// Features by the capabilities of SPIR-V that need them (Vulkan specification, "Capabilities"):
+/// whoever wrote a foreign kernel did not have this device.
+constexpr std::pair<std::string_view, const char*> kFeatures[] = {
+    {"Float16", "shaderFloat16"},
+    {"Float64", "shaderFloat64"},
+    {"Int8", "shaderInt8"},
+    {"Int16", "shaderInt16"},
+    {"Int64", "shaderInt64"},
+    {"ImageGatherExtended", "shaderImageGatherExtended"},
+    {"StorageImageExtendedFormats", "shaderStorageImageExtendedFormats"},
+    {"StorageImageReadWithoutFormat", "shaderStorageImageReadWithoutFormat"},
+    {"StorageImageWriteWithoutFormat", "shaderStorageImageWriteWithoutFormat"},
+    {"UniformBufferArrayDynamicIndexing", "shaderUniformBufferArrayDynamicIndexing"},
+    {"SampledImageArrayDynamicIndexing", "shaderSampledImageArrayDynamicIndexing"},
+    {"StorageBufferArrayDynamicIndexing", "shaderStorageBufferArrayDynamicIndexing"},
+    {"StorageImageArrayDynamicIndexing", "shaderStorageImageArrayDynamicIndexing"},
+};
+
+std::vector<std::string> featuresOf(const Reflection& reflection) {
+  std::vector<std::string> features;
+  for (const auto& [capability, feature] : kFeatures)
+    if (std::ranges::find(reflection.capabilities, capability) != reflection.capabilities.end())
+      features.emplace_back(feature);
+  return features;
 }
 
 bool asksForSubgroups(const Reflection& reflection) {
@@ -29,6 +57,7 @@ Subject::Subject(Gpu& gpu, const KernelRecord& record, KernelModule module)
   const Reflection reflection = reflect(module.words, module.entryPoint);
   const Adapter* adapter = module.adapter ? &*module.adapter : nullptr;
   mapping = interfaceOf(record, reflection, adapter, file);
+  if (const auto why = gpu.info().lacks(featuresOf(reflection))) throw Unsupported(*why);
   if (adapter != nullptr) manners = adapter->conventions;
   subgroups = asksForSubgroups(reflection);
   const StrictOptions strict{.signedZeroInfNanPreserve = gpu.info().signedZeroInfNanFloat32,

@@ -449,10 +449,26 @@ class Matcher {
       lines.push_back(fmt::format(
           "'{}' is at set {}, binding {} in the shader, set 0, binding {} in the contract",
           spec.name, found->set, found->binding, spec.binding));
-    result.images.push_back(
-        {.name = spec.name,
-         .slot = {.set = found->set, .binding = found->binding, .kind = kindOf(*found)},
-         .asArray = found->type.ends_with("2DArray")});
+    refuseDescriptors(spec, *found);
+    result.images.push_back({.name = spec.name,
+                             .slot = {.set = found->set,
+                                      .binding = found->binding,
+                                      .kind = kindOf(*found),
+                                      .count = found->count},
+                             .asArray = found->type.ends_with("2DArray")});
+  }
+
+  /// A foreign kernel may write fewer mip levels than the contract has room for.
+  void refuseDescriptors(const ImageSpec& spec, const ReflectedBinding& found) {
+    if (found.count == spec.descriptors) return;
+    if (adapter != nullptr && found.count > 0 && found.count < spec.descriptors) return;
+    const auto inWords = [](unsigned count) {
+      return count == 0   ? std::string("an array without a size")
+             : count == 1 ? std::string("one image")
+                          : fmt::format("an array of {}", count);
+    };
+    lines.push_back(fmt::format("'{}' is {} in the shader, {} in the contract", spec.name,
+                                inWords(found.count), inWords(spec.descriptors)));
   }
 
   static BindingSlot::Kind kindOf(const ReflectedBinding& b) {

@@ -111,6 +111,9 @@ struct ImageSpec {
   PixelFormat format = PixelFormat::kRgba8;  ///< of it in a frame
   SamplerDescription sampler{};              ///< where the type begins with "sampler"
   std::string meaning{};                     ///< as Field::meaning
+  /// Of an array `image2D levels[N]`: element m sees mip level m, those past the last level see
+  /// that one.
+  unsigned descriptors = 1;
 
   BindingSlot::Kind kind() const;
 };

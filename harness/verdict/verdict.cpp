@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "harness/hygiene/levels.h"
 #include "harness/verdict/parallel.h"
 
 namespace gnomon {
@@ -60,12 +61,6 @@ void keepWorse(std::optional<Offender>& worst, Offender candidate) {
   if (!worst || candidate.budget > worst->budget ||
       (candidate.budget == worst->budget && candidate.element < worst->element))
     worst = std::move(candidate);
-}
-
-/// "results[12]" or "target(3, 5)".
-std::string placeOf(const Expectation& e, std::size_t element) {
-  if (e.width == 0) return fmt::format("{}[{}]", e.output, element);
-  return fmt::format("{}({}, {})", e.output, element % e.width, element / e.width);
 }
 
 /// The model's value where the interval holds it, else the end next to it.
@@ -294,7 +289,7 @@ class Judge {
         "the model of {}.{} reaches '{}' outside the domain in which Vulkan "
         "specifies it, so nothing can be judged there: the test asks too much, or the "
         "kernel's contract must avoid it",
-        placeOf(expected, i), scalars[s].name, nameOf(unspecifiedOperations(b.flags).front())));
+        expected.place(i), scalars[s].name, nameOf(unspecifiedOperations(b.flags).front())));
   }
 
   void measure(const Intervals& allowed) {
@@ -424,7 +419,7 @@ std::string fieldTable(const Verdict& v) {
 }
 
 std::string worstElement(const Offender& o, const Expectation& expected) {
-  return fmt::format("worst: {}.{}\n", placeOf(expected, o.element), o.field) + explainNumbers(o) +
+  return fmt::format("worst: {}.{}\n", expected.place(o.element), o.field) + explainNumbers(o) +
          "  for the input\n" + expected.inputs(o.element);
 }
 
@@ -435,6 +430,12 @@ const FieldVerdict* firstOutside(const Verdict& v) {
 }
 
 }  // namespace
+
+std::string Expectation::place(std::size_t element) const {
+  if (width == 0) return fmt::format("{}[{}]", output, element);
+  if (mips > 1) return placeOn(output, pixelAt({width, height, mips}, element));
+  return fmt::format("{}({}, {})", output, element % width, element / width);
+}
 
 std::string_view nameOf(Class c) {
   return c == Class::kConforms ? "conforms" : c == Class::kEquivalent ? "equivalent" : "wrong";

@@ -25,6 +25,8 @@ struct Expectation {
   std::string output;  ///< as the observation calls it
   std::size_t elements = 0;
   unsigned width = 0;  ///< pixels in a row of an image; 0: a buffer
+  /// Of an image with mip levels how many there are, and the height of the largest.
+  unsigned mips = 1, height = 0;
   /// Format that every scalar is stored in and read back from: the observation's narrow copy.
   Storage storage = Storage::float32;
   /// The first `corners` elements are corner cases and are always judged by intervals.
@@ -36,6 +38,9 @@ struct Expectation {
   std::function<void(std::size_t element, std::span<Bounded> scalars)> bounded;
   /// The element's inputs, one "name value" line each; asked for only when a message needs them.
   std::function<std::string(std::size_t element)> inputs;
+
+  /// "results[12]", "target(3, 5)" or "pyramid level 2 (3, 4)".
+  std::string place(std::size_t element) const;
 };
 
 /// The rules that decide.

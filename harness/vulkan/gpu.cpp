@@ -196,8 +196,10 @@ void requireComplete(const vulkan::Program& program, const Dispatch& dispatch) {
                                          takesSampler(bound.slot) ? "a sampler" : "no sampler"));
 }
 
-/// The mip levels that a kernel sees; -1: all. A storage image has only one.
-int mipOf(const BoundImage& bound) {
+/// The mip levels that a kernel sees in the k-th descriptor; -1: all. A storage image has only one.
+int mipOf(const BoundImage& bound, unsigned k) {
+  if (bound.slot.count > 1)
+    return static_cast<int>(std::min(k, bound.image->description().mips - 1));
   if (bound.mip >= 0)
     requireInside(bound.image->description(), 0, static_cast<unsigned>(bound.mip));
   return bound.mip < 0 && bound.slot.kind == BindingSlot::Kind::kStorageImage ? 0 : bound.mip;
@@ -296,16 +298,18 @@ std::vector<double> Gpu::run(std::span<const Dispatch> dispatches,
           {bound.slot, {bound.buffer->impl->buffer.buffer.get(), bound.offset, rangeOf(bound)}});
     }
     for (const BoundImage& bound : dispatch.images) {
-      vulkan::BoundView& view = command.images.emplace_back();
-      view.slot = bound.slot;
-      view.image.imageLayout = VK_IMAGE_LAYOUT_GENERAL;
-      if (bound.sampler != nullptr) view.image.sampler = bound.sampler->impl->sampler.get();
+      VkDescriptorImageInfo view{};
+      view.imageLayout = VK_IMAGE_LAYOUT_GENERAL;
+      if (bound.sampler != nullptr) view.sampler = bound.sampler->impl->sampler.get();
+      vulkan::BoundView& views =
+          command.images.emplace_back(vulkan::BoundView{bound.slot, {bound.slot.count, view}});
       if (bound.image == nullptr) continue;
       vulkan::Image& image = bound.image->impl->image;
       requireUse(
           impl->device->adapter, image, bound.slot.kind,
           bound.sampler == nullptr ? SamplerDescription{} : bound.sampler->impl->description);
-      view.image.imageView = impl->device->viewOf(image, {mipOf(bound), bound.asArray});
+      for (unsigned k = 0; k < bound.slot.count; ++k)
+        views.images[k].imageView = impl->device->viewOf(image, {mipOf(bound, k), bound.asArray});
     }
   }
   if (commands.empty()) return {};

@@ -169,6 +169,7 @@ struct BindingSlot {
   unsigned set = 0;
   unsigned binding = 0;
   Kind kind = Kind::kStorageBuffer;
+  unsigned count = 1;  ///< descriptors, of an array of images
   auto operator<=>(const BindingSlot&) const = default;
 };
 
@@ -208,7 +209,8 @@ struct BoundBuffer {
 };
 
 /// One image, sampler, or both, bound for a dispatch. The kernel sees the image as what it is: 2D,
-/// a 2D array if it has several layers, a cube map, or an array of them.
+/// a 2D array if it has several layers, a cube map, or an array of them. In an array of descriptors
+/// each sees one mip level: the k-th level k, those past the last level that one.
 struct BoundImage {
   BindingSlot slot;
   const GpuImage* image = nullptr;      ///< none at a kSampler

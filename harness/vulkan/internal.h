@@ -258,7 +258,7 @@ struct BoundRange {
 
 struct BoundView {
   BindingSlot slot;
-  VkDescriptorImageInfo image{};
+  std::vector<VkDescriptorImageInfo> images;  ///< as many as the slot has descriptors
 };
 
 struct Command {

@@ -20,10 +20,17 @@ void requireLimits(const Adapter& adapter, const ProgramDescription& description
       std::ranges::find(sizes, description.subgroupSize) == sizes.end())
     throw Unsupported(fmt::format("subgroups of {}; {} cannot make them", description.subgroupSize,
                                   adapter.info.name));
-  for (const BindingSlot& slot : description.slots)
+  unsigned storageImages = 0;
+  for (const BindingSlot& slot : description.slots) {
     if (slot.set >= adapter.limits.maxBoundDescriptorSets)
       throw Unsupported(fmt::format("descriptor set {}; {} has {} sets", slot.set,
                                     adapter.info.name, adapter.limits.maxBoundDescriptorSets));
+    if (slot.kind == BindingSlot::Kind::kStorageImage) storageImages += slot.count;
+  }
+  if (storageImages > adapter.limits.maxPerStageDescriptorStorageImages)
+    throw Unsupported(fmt::format("{} storage images; {} allows {}", storageImages,
+                                  adapter.info.name,
+                                  adapter.limits.maxPerStageDescriptorStorageImages));
 }
 
 OwnedSetLayout makeSetLayout(Device& device, std::span<const BindingSlot> slots, unsigned set) {
@@ -31,7 +38,7 @@ OwnedSetLayout makeSetLayout(Device& device, std::span<const BindingSlot> slots,
   for (const BindingSlot& slot : slots)
     if (slot.set == set)
       bindings.push_back(
-          {slot.binding, descriptorType(slot), 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+          {slot.binding, descriptorType(slot), slot.count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
   VkDescriptorSetLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   info.bindingCount = static_cast<std::uint32_t>(bindings.size());

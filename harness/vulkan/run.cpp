@@ -7,7 +7,7 @@ namespace gnomon::vulkan {
 
 void DescriptorNeeds::add(const Program& program) {
   sets += static_cast<std::uint32_t>(program.sets.size());
-  for (const BindingSlot& slot : program.slots) ++descriptors[descriptorType(slot)];
+  for (const BindingSlot& slot : program.slots) descriptors[descriptorType(slot)] += slot.count;
 }
 
 void DescriptorNeeds::widenTo(const DescriptorNeeds& other) {
@@ -77,12 +77,13 @@ std::vector<VkDescriptorSet> Runner::describe(const Command& command) {
     write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
     write.dstSet = sets[slot.set];
     write.dstBinding = slot.binding;
-    write.descriptorCount = 1;
+    write.descriptorCount = slot.count;
     write.descriptorType = descriptorType(slot);
     return write;
   };
   for (const BoundRange& bound : command.buffers) writeTo(bound.slot).pBufferInfo = &bound.buffer;
-  for (const BoundView& bound : command.images) writeTo(bound.slot).pImageInfo = &bound.image;
+  for (const BoundView& bound : command.images)
+    writeTo(bound.slot).pImageInfo = bound.images.data();
   vkUpdateDescriptorSets(device->owner.handle, static_cast<std::uint32_t>(writes.size()),
                          writes.data(), 0, nullptr);
   return sets;
