@@ -1,0 +1,125 @@
+// The whole pyramid of farthest depths in one dispatch. A group makes one texel of level kHizTile
+// and all below it; the group that is done last makes the levels above from those texels, and does
+// so tile by tile as well, kHizTile levels a round.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_shader_image_load_formatted : require
+#include "culling.h"
+#include "hiz.glsl"
+
+layout(local_size_x = kHizGroup) in;
+layout(push_constant, scalar) uniform Push { Hiz push; };
+layout(set = 0, binding = kHizDepth) uniform texture2D depth;
+layout(set = 0, binding = kHizLevels) writeonly uniform image2D levels[kMaxLevels];
+layout(set = 0, binding = kHizScratch, scalar) coherent buffer Scratch { uint scratch[]; };
+
+// A tile has up to 127 texels a side (the last one takes the rest), two levels on up to 31.
+const uint kPitch = (2u << kHizTile) / 4u - 1u;
+shared uint tileTexels[kPitch * kPitch];
+shared bool lastGroup;
+
+uvec2 sizeOf(uint level) { return max(push.size >> level, uvec2(1)); }
+
+uint lastLevel() { return uint(findMSB(max(push.size.x, push.size.y))); }
+
+// Where the texels end that `at` covers, `steps` levels below `level`: the last one of its row or
+// column takes the rest.
+uvec2 endOf(uvec2 at, uint level, uint steps) {
+  return mix((at + 1u) << steps, sizeOf(level - steps), equal(at, sizeOf(level) - 1u));
+}
+
+void store(uint level, uvec2 at, uint bits) {
+  if (level <= lastLevel()) imageStore(levels[level - 1u], ivec2(at), vec4(uintBitsToFloat(bits)));
+}
+
+// A texel of a level from kHizTile on stands in scratch where the first texel of level kHizTile
+// does that it covers: only the thread that makes it has read what was there.
+uint placeOf(uint level, uvec2 at) {
+  const uvec2 first = at << (level - kHizTile);
+  return 1u + first.y * sizeOf(kHizTile).x + first.x;
+}
+
+uint load(uint level, uvec2 at) {
+  if (level == 0u) return depthBits(texelFetch(depth, ivec2(at), 0).r);
+  return scratch[placeOf(level, at)];
+}
+
+// A texel of level base + 1.
+uint firstStep(uint base, uvec2 at) {
+  const uvec2 begin = 2u * at, end = endOf(at, base + 1u, 1u);
+  if (end == begin + 2u)  // all but the last: no loop, so that the loads overlap
+    return min(min(load(base, begin), load(base, begin + uvec2(1, 0))),
+               min(load(base, begin + uvec2(0, 1)), load(base, begin + 1u)));
+  uint farthest = kBeyondDepth;
+  for (uint y = begin.y; y < end.y; ++y)
+    for (uint x = begin.x; x < end.x; ++x) farthest = min(farthest, load(base, uvec2(x, y)));
+  return farthest;
+}
+
+// A texel of level base + 2, and those of base + 1 on the way.
+uint twoSteps(uint base, uvec2 at) {
+  const uvec2 begin = 2u * at, end = endOf(at, base + 2u, 1u);
+  uint farthest = kBeyondDepth;
+  for (uint y = begin.y; y < end.y; ++y)
+    for (uint x = begin.x; x < end.x; ++x) {
+      const uint texel = firstStep(base, uvec2(x, y));
+      store(base + 1u, uvec2(x, y), texel);
+      farthest = min(farthest, texel);
+    }
+  return farthest;
+}
+
+// A texel of base + step from those of the level before, which stand kPitch a row and a power of
+// two apart: each level takes the places of the first texels that it is made of.
+uint laterStep(uvec2 at, uvec2 end, uint step) {
+  uint farthest = kBeyondDepth;
+  for (uint y = 2u * at.y; y < end.y; ++y)
+    for (uint x = 2u * at.x; x < end.x; ++x)
+      farthest = min(farthest, tileTexels[((y * kPitch + x) << (step - 3u))]);
+  return farthest;
+}
+
+// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch.
+void reduceTile(uint base, uvec2 tile) {
+  for (uint step = 2u; step <= kHizTile; ++step) {
+    barrier();
+    const uint up = kHizTile - step;
+    const uvec2 begin = tile << up, size = endOf(tile, base + kHizTile, up) - begin;
+    for (uint i = gl_LocalInvocationIndex; i < size.x * size.y; i += kHizGroup) {
+      const uvec2 local = uvec2(i % size.x, i / size.x), at = begin + local;
+      const uint texel = step == 2u
+                             ? twoSteps(base, at)
+                             : laterStep(local, endOf(at, base + step, 1u) - 2u * begin, step);
+      store(base + step, at, texel);
+      tileTexels[(local.y * kPitch + local.x) << (step - 2u)] = texel;
+    }
+  }
+  if (gl_LocalInvocationIndex == 0u) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
+}
+
+// Whether all other groups have written their texels of level kHizTile.
+bool isLastGroup() {
+  if (gl_LocalInvocationIndex == 0u) {
+    memoryBarrierBuffer();
+    lastGroup = atomicAdd(scratch[0], 1u) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
+    memoryBarrierBuffer();
+  }
+  barrier();
+  return lastGroup;
+}
+
+void main() {
+  reduceTile(0u, gl_WorkGroupID.xy);
+  if (!isLastGroup()) return;
+  for (uint base = kHizTile; base < lastLevel(); base += kHizTile) {
+    const uvec2 tiles = sizeOf(base + kHizTile);
+    for (uint y = 0u; y < tiles.y; ++y)
+      for (uint x = 0u; x < tiles.x; ++x) reduceTile(base, uvec2(x, y));
+    memoryBarrierBuffer();  // the next round reads what thread 0 has written
+    barrier();
+  }
+  const uvec2 groups = sizeOf(kHizTile);
+  for (uint i = gl_LocalInvocationIndex; i <= groups.x * groups.y; i += kHizGroup) scratch[i] = 0u;
+}

@@ -1,0 +1,14 @@
+// What the kernels of the depth pyramid share.
+#ifndef GNOMON_HIZ_GLSL
+#define GNOMON_HIZ_GLSL
+
+// The bits of a depth as it counts. Those of numbers from 0 up are ordered as the numbers are, so a
+// minimum of them is exact on any device, denormal or not. All else has bits from infinity's on.
+uint depthBits(float depth) {
+  const uint bits = floatBitsToUint(depth);
+  return bits < 0x7f800000u ? bits : 0u;
+}
+
+const uint kBeyondDepth = 0xffffffffu;  // nearer than any depth: the minimum of none
+
+#endif

@@ -1,0 +1,61 @@
+// culling/hiz: all levels of the pyramid in one dispatch.
+//
+// Covered: every texel to the bit, as in hiz_level_test.cpp, and here at sizes around a tile, with
+// tiles that take up to 127 pixels a side, and so many of them that the last group makes a second
+// round; an image without levels; scratch left as it was (hygiene). Frames were watched as small
+// images. Not covered: images beyond 65535 pixels a side.
+#include "tests/culling/hiz_cases.h"
+
+namespace gnomon::culling {
+namespace {
+
+class CullingHiz : public HizCase {};
+
+constexpr uint kTile = 1u << kHizTile;
+
+TEST_F(CullingHiz, EverySizeIsExact) {
+  for (const uvec2 size : {uvec2(1, 2), uvec2(1, 7), uvec2(3, 5), uvec2(17, 9), uvec2(31, 62)})
+    expectEveryTexel(generatedDepths(size, caseSeed() + size.x));
+}
+
+// One tile or two, the last of which takes the rest of its row or column.
+TEST_F(CullingHiz, EverySizeAroundATileIsExact) {
+  for (const uvec2 size :
+       {uvec2(kTile - 1, kTile), uvec2(kTile), uvec2(kTile + 1, 2 * kTile - 1), uvec2(2 * kTile, 1),
+        uvec2(2 * kTile - 1), uvec2(2 * kTile + 1, 3 * kTile - 1)})
+    expectEveryTexel(generatedDepths(size, caseSeed() + size.x));
+}
+
+// More tiles than one tile has texels: 129 and 192 a row, and 127, which one more tile takes.
+TEST_F(CullingHiz, LevelsAboveTheSecondTileAreExact) {
+  for (const uvec2 size : {uvec2(8256, 3), uvec2(3, 12351), uvec2(8128, 65)})
+    expectEveryTexelAtOnce(generatedDepths(size, caseSeed() + size.x));
+}
+
+TEST_F(CullingHiz, OddSizesAreExact) {
+  for (const uvec2 size : {uvec2(1023, 767), uvec2(4095, 1)})
+    expectEveryTexelAtOnce(generatedDepths(size, caseSeed() + size.x));
+}
+
+TEST_F(CullingHiz, FramesAreExact) {
+  for (const uvec2 size : {uvec2(1366, 768), uvec2(1920, 1080), uvec2(3840, 2160)})
+    expectEveryTexelAtOnce(generatedDepths(size, caseSeed() + size.x));
+}
+
+TEST_F(CullingHiz, AHoleOfOnePixelIsSeenWhereverItIs) {
+  expectEveryTexel(holedDepths({187, 59}, caseSeed()));
+}
+
+TEST_F(CullingHiz, BadDepthsCountAsTheContractSays) {
+  const DepthBuffer depths = specialDepths();
+  expectEveryTexel(depths);
+  expectNoNegativeZeros(dispatch(depths), "levels");
+}
+
+TEST_F(CullingHiz, ADepthBufferIsReadAsItIs) {
+  const DepthBuffer depths = generatedDepths({65, 33}, caseSeed());
+  expectConforms(dispatch(depths, Effort::kWatched, PixelFormat::kD32), modelOfAll(depths));
+}
+
+}  // namespace
+}  // namespace gnomon::culling
