@@ -55,7 +55,7 @@ void checkWords(std::vector<std::string>& findings, const Output& out,
                           b == out.poisoned(kPoison[1], i % perElement);
     (poisoned ? unwritten : differing).note(i);
   }
-  if (unwritten.words > 0)
+  if (unwritten.words > 0 && !out.list)
     findings.push_back(fmt::format("the {} left {} of {} words of '{}' unwritten, first {}", module,
                                    unwritten.words, first.size() / kWord, out.name,
                                    where(out, unwritten.first * kWord)));
@@ -77,7 +77,10 @@ class Observer {
     resources.upload();
     Aftermath first = resources.run(program, kPoison[0]);
     const Aftermath second = resources.run(program, kPoison[1]);
-    for (const auto& found : {first.strays, resources.changedInputs()})
+    // The same again in the second run would be no news.
+    const auto& strays = first.strays.empty() ? second.strays : first.strays;
+    strayed = strayed || !strays.empty();
+    for (const auto& found : {strays, resources.changedInputs()})
       for (const std::string& what : found)
         seen.findings.push_back(fmt::format("the {} {}", module, what));
     for (std::size_t o = 0; o < resources.outputs().size(); ++o) {
@@ -103,6 +106,9 @@ class Observer {
   void compare(const GpuProgram& program, const std::string& arrangement, const char* why) {
     resources.upload();
     const Aftermath other = resources.run(program, kPoison[0]);
+    if (!strayed)
+      for (const std::string& what : other.strays)
+        seen.findings.push_back(fmt::format("{}, it {}: {}", arrangement, what, why));
     for (std::size_t o = 0; o < other.outputs.size(); ++o) {
       const Output& out = resources.outputs()[o];
       const Bytes& first = seen.twin.at(out.name);
@@ -119,6 +125,7 @@ class Observer {
   const Subject& subject;
   Resources& resources;
   Observation& seen;
+  bool strayed = false;  // already in the usual order
 };
 
 bool writesNarrow(const Subject& subject, const Stimulus& stimulus) {

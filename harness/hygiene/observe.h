@@ -39,8 +39,9 @@ enum class Watch {
 /// A kernel whose threads communicate also runs as its order twin (harness/program/order.h), which
 /// has to give the same words: where it does not, a barrier is missing or groups race.
 ///
-/// Findings: words not written, writes outside, writes into inputs, runs that differ though the
-/// contract says deterministic, an order twin that differs, validation messages. Throws GpuError
+/// Findings: words not written, writes outside, writes into inputs, scratch that is not left as
+/// zeros, runs that differ though the contract says deterministic, an order twin that differs,
+/// validation messages. Throws GpuError
 /// when the device is lost or the limit passes.
 Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watch = Watch::kAll);
 

@@ -154,7 +154,8 @@ void Resources::layOut() {
     Output output{.name = o.buffer,
                   .layout = record.buffer(o.buffer).element,
                   .elements = o.elements,
-                  .given = {}};
+                  .given = {},
+                  .list = o.list};
     output.given.assign(output.layout.size / kWord, false);
     for (const auto& place : interface.placesOf(o.buffer))
       for (unsigned s = 0; place && s < place->field.scalars; ++s)
@@ -162,7 +163,18 @@ void Resources::layOut() {
     traffic += output.dataBytes();
     out.push_back(std::move(output));
   }
+  layOutScratch();
   for (Memory& m : memories) m.size = m.spec->bytes + m.elements * m.spec->stride;
+}
+
+void Resources::layOutScratch() {
+  for (const auto& [name, index] : interface.scratch) memories[index].scratch = true;
+  for (const OutputCount& s : stimulus.scratch) {
+    if (record.buffer(s.buffer).access != Access::kScratch)
+      throw std::logic_error(fmt::format("'{}' is no scratch of {}", s.buffer, record.name()));
+    if (const auto found = interface.scratch.find(s.buffer); found != interface.scratch.end())
+      memories[found->second].elements = s.elements;
+  }
 }
 
 void Resources::packInputs() {
@@ -197,7 +209,7 @@ void Resources::allocate() {
   const std::size_t align = std::max<std::size_t>(gpu.offsetAlignment(), kWord);
   for (Memory& m : memories) {
     const bool uniform = m.spec->slot.kind == BindingSlot::Kind::kUniformBuffer;
-    if (m.spec->bytes > 0) m.content.resize(m.size);  // a header starts as 0
+    if (m.spec->bytes > 0 || m.scratch) m.content.resize(m.size);  // a header starts as 0
     m.before = m.spec->written ? (kGuardBytes + align - 1) / align * align : 0;
     m.after = uniform ? 0 : kGuardBytes;
     m.buffer = gpu.allocate(m.before + m.size + m.after);
@@ -295,9 +307,9 @@ void Resources::bindImages() {
 
 void Resources::upload() {
   for (const Memory& m : memories) {
-    if (m.spec->written) continue;
+    if (m.spec->written && !m.scratch) continue;
     gpu.fill(m.buffer, kGuardPattern);
-    gpu.upload(m.buffer, 0, m.content);
+    gpu.upload(m.buffer, m.before, m.content);
   }
   for (std::size_t i = 0; i < inImages.size(); ++i) {
     const InputImage& given = stimulus.inputImages[i];
@@ -340,6 +352,7 @@ Aftermath Resources::run(const GpuProgram& program, std::uint32_t poison) {
     gpu.download(memories[i].buffer, 0, contents[i]);
     checkGuards(memories[i], contents[i], poison, after.strays);
     checkKept(memories[i], contents[i], after.strays);
+    checkScratch(memories[i], contents[i], after.strays);
   }
   for (const Output& o : out)
     after.outputs.push_back(o.isImage() ? cropped(o, downloadImage(o), poison, after.strays)
@@ -375,10 +388,23 @@ void Resources::checkKept(const Memory& m, const Bytes& whole,
                           std::vector<std::string>& strays) const {
   for (const std::size_t at : m.kept)
     if (std::memcmp(whole.data() + m.before + at, m.content.data() + at, kWord) != 0)
-      return strays.push_back("wrote into its input, at " + inputPlace(m, at));
+      return strays.push_back("wrote into its input, at " + wordPlace(m, at));
 }
 
-std::string Resources::inputPlace(const Memory& m, std::size_t byte) const {
+void Resources::checkScratch(const Memory& m, const Bytes& whole,
+                             std::vector<std::string>& strays) const {
+  if (!m.scratch) return;
+  for (std::size_t at = 0; at + kWord <= m.size; at += kWord) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, whole.data() + m.before + at, kWord);
+    if (word != 0)
+      return strays.push_back(fmt::format(
+          "left '{}' other than zero, first at {}: {}; the next dispatch starts from it",
+          m.spec->name, wordPlace(m, at), word));
+  }
+}
+
+std::string Resources::wordPlace(const Memory& m, std::size_t byte) const {
   if (m.spec->stride == 0 || byte < m.spec->bytes)
     return fmt::format("byte {} of '{}'", byte, m.spec->name);
   const std::size_t element = (byte - m.spec->bytes) / m.spec->stride;
@@ -400,7 +426,7 @@ std::vector<std::string> Resources::changedInputs() const {
     const auto changed = std::ranges::mismatch(m.content, now).in1;
     if (changed != m.content.end()) {
       const auto byte = static_cast<std::size_t>(changed - m.content.begin());
-      found.push_back("wrote into its input, at " + inputPlace(m, byte));
+      found.push_back("wrote into its input, at " + wordPlace(m, byte));
       continue;
     }
     for (std::size_t at = (m.content.size() + kWord - 1) / kWord * kWord; at + kWord <= now.size();

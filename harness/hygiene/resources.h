@@ -38,6 +38,8 @@ struct Output {
   std::string meaning{};      ///< as ImageSpec's
   std::vector<bool> given{};  ///< by word of an element: whether the module gives it at all
 
+  bool list = false;  ///< a buffer that need not be written to its end
+
   bool isImage() const { return width > 0; }
   std::size_t dataBytes() const { return elements * layout.size; }
   /// What a word of an unwritten element reads as after a fill with the pattern.
@@ -58,7 +60,7 @@ class Resources {
   /// an input image does not have the bytes that its description asks for.
   Resources(const Subject& subject, const Stimulus& stimulus, Target target);
 
-  /// Inputs as the stimulus has them, each followed by a guard band of NaN.
+  /// Inputs as the stimulus has them, each followed by a guard band of NaN; scratch as zeros.
   void upload();
 
   /// Fills every output, guards included, with the pattern and runs the program once.
@@ -78,6 +80,7 @@ class Resources {
   /// One of the module's buffers: guard, content, guard.
   struct Memory {
     const ModuleBuffer* spec = nullptr;
+    bool scratch = false;
     std::size_t elements = 0;
     Bytes content{};  ///< what a run starts from; empty where that is all poison
     std::vector<std::size_t>
@@ -88,6 +91,7 @@ class Resources {
   };
 
   void layOut();
+  void layOutScratch();
   void packInputs();
   void packParameters();
   void allocate();
@@ -100,12 +104,15 @@ class Resources {
   void checkGuards(const Memory& memory, const Bytes& whole, std::uint32_t poison,
                    std::vector<std::string>& strays) const;
   void checkKept(const Memory& memory, const Bytes& whole, std::vector<std::string>& strays) const;
+  void checkScratch(const Memory& memory, const Bytes& whole,
+                    std::vector<std::string>& strays) const;
   Bytes unpacked(const Output& output, const std::vector<Bytes>& memories) const;
   Bytes downloadImage(const Output& output) const;
   /// The part of an image that is to be written; what is beyond it has to be poison still.
   Bytes cropped(const Output& output, Bytes texels, std::uint32_t poison,
                 std::vector<std::string>& strays) const;
-  std::string inputPlace(const Memory& memory, std::size_t byte) const;
+  /// Of a word that is no output, in the contract's names.
+  std::string wordPlace(const Memory& memory, std::size_t byte) const;
 
   Gpu& gpu;
   const KernelRecord& record;

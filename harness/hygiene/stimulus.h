@@ -19,6 +19,7 @@ struct InputBytes {
 struct OutputCount {
   std::string buffer{};
   std::size_t elements = 0;
+  bool list = false;  ///< elements beyond what the kernel lists stay as they are
 };
 
 /// Any format will do that a kernel can read: a frame's, or 32-bit floats for exact stimulus.
@@ -41,6 +42,7 @@ struct OutputImage {
 struct Stimulus {
   std::vector<InputBytes> inputs{};
   std::vector<OutputCount> outputs{};
+  std::vector<OutputCount> scratch{};
   std::vector<InputImage> inputImages{};
   std::vector<OutputImage> outputImages{};
   std::span<const std::byte> push{};

@@ -65,7 +65,8 @@ class Matcher {
     if (adapter != nullptr && adapter->grid) result.covered = *adapter->grid;
     result.specialization = record.specialization;
     addBuffers();
-    for (const BufferSpec& b : record.buffers) placeBuffer(b);
+    for (const BufferSpec& b : record.buffers)
+      b.access == Access::kScratch ? placeScratch(b) : placeBuffer(b);
     placePush();
     for (const ImageSpec& i : record.images) placeImage(i);
     takeConstants();
@@ -86,6 +87,7 @@ class Matcher {
     for (const Field& f : record.push.fields) fields.insert("push." + f.name);
     for (const BufferSpec& b : record.buffers) {
       bound.insert(b.name);
+      if (b.access == Access::kScratch) continue;  // what a kernel keeps there is its own business
       for (const Field& f : b.element.fields) fields.insert(b.name + "." + f.name);
     }
     for (const ImageSpec& i : record.images) bound.insert(i.name);
@@ -313,8 +315,7 @@ class Matcher {
         spec.element.fields, [&](const Field& f) { return named(spec.name + "." + f.name); });
     const ReflectedBinding* block = binding(spec.name, spec.binding, "buffer", !elsewhere);
     if (block != nullptr && block->kind != "storage buffer" && block->kind != "uniform buffer") {
-      lines.push_back(fmt::format("'{}' is a {} in the shader, a storage buffer in the contract",
-                                  spec.name, block->kind));
+      refuseKind(spec, *block);
       block = nullptr;
     }
     if (adapter == nullptr && block != nullptr) compareStrictly(spec, *block);
@@ -339,6 +340,31 @@ class Matcher {
         std::ranges::none_of(places, [](const auto& p) { return p.has_value(); }))
       lines.push_back(fmt::format("no field of the output '{}' is found in the shader", spec.name));
     result.places[spec.name] = std::move(places);
+  }
+
+  /// A foreign kernel need not have it, and may keep there what it likes.
+  void placeScratch(const BufferSpec& spec) {
+    std::vector<std::optional<Place>>& places = result.places[spec.name];
+    places.resize(spec.element.fields.size());
+    const bool named = std::ranges::find(module.bindings, spec.name, &ReflectedBinding::name) !=
+                       module.bindings.end();
+    if (adapter != nullptr && !named && !adapter->bindings.contains(spec.name)) return;
+    const ReflectedBinding* block = binding(spec.name, spec.binding, "buffer", true);
+    if (block == nullptr) return;
+    if (block->kind != "storage buffer") return refuseKind(spec, *block);
+    result.scratch[spec.name] = indexOf(block);
+    result.buffers[indexOf(block)].written = true;
+    if (adapter != nullptr) return;
+    compareStrictly(spec, *block);
+    missing.clear();
+    for (std::size_t f = 0; f < places.size(); ++f)
+      places[f] = sameNamed(spec.name, spec.element.fields[f], *block);
+    lines.insert(lines.end(), missing.begin(), missing.end());
+  }
+
+  void refuseKind(const BufferSpec& spec, const ReflectedBinding& block) {
+    lines.push_back(fmt::format("'{}' is a {} in the shader, a storage buffer in the contract",
+                                spec.name, block.kind));
   }
 
   /// Functions stand for the outputs that they are given for, though the entry around them has all.

@@ -56,6 +56,9 @@ struct Interface {
   std::vector<ModuleBuffer> buffers{};
   /// By contract buffer, one for each of its fields in order; none where the module lacks it.
   std::map<std::string, std::vector<std::optional<Place>>> places{};
+  /// Of Interface::buffers, by the contract's name of what is scratch; none where the module has it
+  /// not.
+  std::map<std::string, unsigned> scratch{};
   std::vector<ModuleImage> images{};
   unsigned pushBytes = 0;
   std::vector<Place> push{};  ///< of the contract's push constants that the module has

@@ -30,6 +30,13 @@ Field typed(const char* type, ScalarType scalar, unsigned scalars) {
   return {.name = {}, .type = type, .scalar = scalar, .scalars = scalars};
 }
 
+/// Of one candidate in a list.
+Struct membership() {
+  Field visible = typed("uint", ScalarType::kUint, 1);
+  visible.name = "visible";
+  return {.name = "Membership", .size = 4, .fields = {visible}};
+}
+
 }  // namespace
 
 std::string Field::scalarName(unsigned component) const {
@@ -73,7 +80,12 @@ const ImageSpec& KernelRecord::image(std::string_view called) const {
   return named(*this, images, called, "image");
 }
 
+const ListSpec& KernelRecord::list(std::string_view called) const {
+  return named(*this, lists, called, "list");
+}
+
 Struct KernelRecord::layoutOf(std::string_view output) const {
+  if (std::ranges::find(lists, output, &ListSpec::name) != lists.end()) return membership();
   const auto found = std::ranges::find(images, output, &ImageSpec::name);
   return found != images.end() ? pixelLayout(found->format) : buffer(output).element;
 }

@@ -85,7 +85,13 @@ Struct describe(std::string name, FieldOf<S, M>... members) {
   return result;
 }
 
-enum class Access { kRead, kWrite };
+enum class Access {
+  kRead,
+  kWrite,
+  /// Memory of a kernel's own, which it reads and writes: zero before a dispatch, and zero again
+  /// after it, for the next frame starts from there. No output.
+  kScratch,
+};
 
 /// A storage buffer whose elements are one contract struct.
 struct BufferSpec {
@@ -133,6 +139,23 @@ struct FunctionEntry {
   std::vector<FunctionSlot> slots{};
 };
 
+/// A list that a kernel makes of some of its candidates: their records, dense and in their order.
+/// It is judged as a set, one uint a candidate that is 1 where the candidate is listed (decodeList
+/// in harness/verdict/list.h makes it of what was observed).
+struct ListSpec {
+  std::string name{};     ///< of that set: "visible"
+  std::string records{};  ///< the output buffer that holds the list
+  std::string id{};       ///< the field of a record that names its candidate: "firstInstance"
+  std::string source{};   ///< the input buffer with the candidates' records, of the same struct
+  bool numbered = false;  ///< the kernel writes the id: the candidate's index. Else the id is the
+                          ///< candidate's own, which strictly increases over the source
+  std::string tally{};    ///< the output buffer of one element that says how many there are:
+  std::string total{};    ///< its field for how many were found,
+  std::string length{};   ///< for how many of them are listed: at most as many as fit,
+  std::string overflowed{};  ///< and 1 where that is fewer than were found, else 0
+  std::string padding{};     ///< the field of a record that is 0 in one that fills the list up
+};
+
 /// One entry of a stage: everything a run of it needs to know.
 struct KernelRecord {
   int order = 0;        ///< of the stage, as a frame runs them (README's stage table)
@@ -141,6 +164,7 @@ struct KernelRecord {
   std::string file{};   ///< under kernels/
   std::vector<BufferSpec> buffers{};
   std::vector<ImageSpec> images{};
+  std::vector<ListSpec> lists{};
   Struct push;
   Grid grid{};                          ///< where it is not as many groups as cover the extent
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
@@ -156,7 +180,8 @@ struct KernelRecord {
   std::string name() const { return stage + "/" + entry; }
   const BufferSpec& buffer(std::string_view called) const;
   const ImageSpec& image(std::string_view called) const;
-  /// Of an element of that buffer or a pixel of that image.
+  const ListSpec& list(std::string_view called) const;
+  /// Of an element of that buffer, a pixel of that image or a candidate of that list.
   Struct layoutOf(std::string_view output) const;
 };
 
