@@ -1,6 +1,8 @@
 // Host side of stage culling: the lists.
 #include "culling.h"
 
+#include <algorithm>
+
 #include "harness/program/kernel.h"
 
 namespace gnomon::culling {
@@ -38,6 +40,11 @@ struct Word {
   uint value;
 };
 
+std::array<uint, 3> aGroupForEveryBlock(const Extent& candidates) {
+  const auto blocks = static_cast<uint>((candidates.count() + kBlock - 1) / kBlock);
+  return {std::max(blocks, 1u), 1, 1};
+}
+
 /// What both have, and where the candidates' draws come from.
 KernelRecord lister(std::string entry, const char* source, unsigned sourceBinding) {
   KernelRecord record{.order = 3, .stage = "culling", .entry = std::move(entry)};
@@ -60,6 +67,7 @@ KernelRecord lister(std::string entry, const char* source, unsigned sourceBindin
                    .total = "total",
                    .length = "listed",
                    .overflowed = "overflowed"}};
+  record.grid = aGroupForEveryBlock;
   record.features = {"scalarBlockLayout"};
   return record;
 }
@@ -78,16 +86,9 @@ KernelRecord frustum(std::string entry) {
 KernelRecord occlusion(std::string entry) {
   KernelRecord record = lister(std::move(entry), "survivors", kSurvivors);
   record.buffers.push_back({.name = "found", .binding = kFound, .element = tally()});
-  record.images = {{.name = "depth",
-                    .binding = kDepth,
-                    .type = "texture2D",
-                    .format = PixelFormat::kD32,
-                    .meaning = "depth"},
-                   {.name = "pyramid",
-                    .binding = kPyramid,
-                    .type = "texture2D",
-                    .format = PixelFormat::kR32f,
-                    .meaning = "depth"}};
+  record.images = {
+      {.name = "depth", .binding = kDepth, .type = "texture2D", .format = PixelFormat::kD32},
+      {.name = "pyramid", .binding = kPyramid, .type = "texture2D", .format = PixelFormat::kR32f}};
   record.push = describe<Occlusion>(
       "Occlusion", field("size", &Occlusion::size), field("objects", &Occlusion::objects),
       field("candidates", &Occlusion::candidates), field("capacity", &Occlusion::capacity),

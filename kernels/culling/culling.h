@@ -15,7 +15,7 @@ using scene::DrawCommand;
 // Lists. `frustum` and `occlusion` copy the draw of every visible candidate into `draws`, dense and
 // in input order. Where more are visible than `capacity`, the first of them are listed. Draws
 // beyond the list stay untouched: a host without vkCmdDrawIndexedIndirectCount zeroes the buffer
-// first and draws all of it.
+// first and draws all of it. A dispatch has a group for every kBlock candidates, at least one.
 struct Tally {      // of one dispatch; a host reads it some frames later
   uint tested;      // candidates
   uint total;       // of them visible

@@ -1,0 +1,194 @@
+// culling/frustum and culling/frustum_subgroups against their model, and by laws and truth.
+//
+// Covered: spheres of every size under every projection, on planes exactly and around them, as sets
+// of what must and may be listed; the list's order, records, tail, capacity, tally; numbers of
+// objects around a block's, and none; groups that ask each other and groups that count again; bad
+// bounds; casters before the near plane; nothing that a ray sees is culled. The path with subgroups
+// repeats what the compaction is about.
+// Not covered: drawing the list (draws_test.cpp), more objects than a few blocks (the benchmarks).
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <glm/matrix.hpp>
+
+#include "harness/cases/random.h"
+#include "harness/cases/special_floats.h"
+#include "kernels/culling/camera.h"
+#include "tests/culling/lists.h"
+
+namespace gnomon::culling {
+namespace {
+
+/// The unit's camera: exact planes x, y = -+2, z = -1 and -9.
+Camera box() { return cameraOf(glm::dmat4(1), orthographic(-2, 2, -2, 2, 1, 9), 1); }
+
+/// Every third one is visible.
+std::vector<Bounds> everyThird(std::size_t n) {
+  std::vector<Bounds> all;
+  for (std::size_t i = 0; i < n; ++i) all.push_back({{i % 3 == 0 ? 0.0f : 50.0f, 0, -5}, 1});
+  return all;
+}
+
+class FrustumCase : public ListCase {
+ protected:
+  using ListCase::ListCase;
+
+  void everySizeAroundABlockIsListed() {
+    for (const std::size_t n :
+         {std::size_t{0}, std::size_t{1}, std::size_t{kGroupSize - 1}, std::size_t{kGroupSize},
+          std::size_t{kBlock - 1}, std::size_t{kBlock}, std::size_t{kBlock + 1},
+          std::size_t{3 * kBlock + 7}})
+      expectRightList(frustumInput(box(), everyThird(n)));
+  }
+
+  void aFullListKeepsTheFirst() {
+    const std::size_t n = 2 * kBlock + 100;
+    const uint found = (n + 2) / 3;
+    for (const uint capacity : {0u, 1u, found - 1, found, found + 1, 5u}) {
+      FrustumInput input = frustumInput(box(), everyThird(n));
+      input.push.capacity = capacity;
+      expectRightList(input);
+      expectRightTally(input, 0);
+    }
+  }
+
+  void blocksAreCountedByWhoeverAsksInVain() {
+    for (const std::size_t n : {std::size_t{kBlock}, std::size_t{3 * kBlock + 1}}) {
+      FrustumInput input = frustumInput(box(), everyThird(n));
+      expectRightTally(input, 0);
+      input.push.patience = 0;
+      expectRightList(input);
+      expectRightTally(input, allRecounted(n));
+    }
+  }
+
+  void manySpheresAreListedAsTheModelSays() {
+    const std::size_t n = generated("elementsPerDomain") / 4;
+    for (const SceneKind kind :
+         {SceneKind::kField, SceneKind::kOffAxis, SceneKind::kInfinite, SceneKind::kOrthographic}) {
+      const Scene scene = generatedScene(kind, caseSeed());
+      expectRightList(frustumInput(scene.camera, spheresAround(scene, n, caseSeed()), scene.pad));
+    }
+  }
+};
+
+class CullingFrustum : public FrustumCase {
+ protected:
+  CullingFrustum() : FrustumCase("culling/frustum") {}
+};
+
+class CullingFrustumSubgroups : public FrustumCase {
+ protected:
+  CullingFrustumSubgroups() : FrustumCase("culling/frustum_subgroups") {}
+};
+
+class CullingFrustumLaws : public CullingFrustum {};
+
+TEST_F(CullingFrustum, EverySizeAroundABlockIsListed) { everySizeAroundABlockIsListed(); }
+TEST_F(CullingFrustumSubgroups, EverySizeAroundABlockIsListed) { everySizeAroundABlockIsListed(); }
+
+TEST_F(CullingFrustum, AFullListKeepsTheFirst) { aFullListKeepsTheFirst(); }
+TEST_F(CullingFrustumSubgroups, AFullListKeepsTheFirst) { aFullListKeepsTheFirst(); }
+
+TEST_F(CullingFrustum, BlocksAreCountedByWhoeverAsksInVain) {
+  blocksAreCountedByWhoeverAsksInVain();
+}
+TEST_F(CullingFrustumSubgroups, BlocksAreCountedByWhoeverAsksInVain) {
+  blocksAreCountedByWhoeverAsksInVain();
+}
+
+TEST_F(CullingFrustum, ManySpheresAreListedAsTheModelSays) { manySpheresAreListedAsTheModelSays(); }
+TEST_F(CullingFrustumSubgroups, ManySpheresAreListedAsTheModelSays) {
+  manySpheresAreListedAsTheModelSays();
+}
+
+// On a grid of quarters everything is exact: nothing here may be decided either way.
+TEST_F(CullingFrustum, TouchingAPlaneIsVisible) {
+  std::vector<Bounds> all;
+  for (const float radius : {0.0f, 0.25f, 1.0f, 3.0f})
+    for (const float off : {-0.25f, 0.0f, 0.25f}) {
+      const float side = 2 + radius + off;
+      all.push_back({{side, 0.5f, -5}, radius});
+      all.push_back({{-side, 0.5f, -5}, radius});
+      all.push_back({{0.5f, side, -5}, radius});
+      all.push_back({{0.5f, -side, -5}, radius});
+      all.push_back({{0.5f, 0.5f, -1 + radius + off}, radius});
+      all.push_back({{0.5f, 0.5f, -9 - radius - off}, radius});
+    }
+  for (const float pad : {0.0f, 0.125f, 0.25f}) expectRightList(frustumInput(box(), all, pad));
+}
+
+// One world unit before the near plane, and behind the far one.
+TEST_F(CullingFrustum, CastersBeforeTheNearPlaneCountWhereAskedFor) {
+  const std::vector<Bounds> all = {
+      {{0, 0, 3}, 1}, {{0, 0, -5}, 1}, {{0, 0, -12}, 1}, {{9, 0, 3}, 1}, {{0, 0, 300}, 1}};
+  for (const uint off : {0u, 1u, 7u}) {
+    FrustumInput input = frustumInput(box(), all);
+    input.push.noNearPlane = off;
+    expectRightList(input);
+  }
+}
+
+TEST_F(CullingFrustum, BadBoundsAreVisible) {
+  std::vector<Bounds> all;
+  for (const float x : specialFloats({kMostWorld, -kMostWorld, 2 * kMostWorld, -1.0f, 50.0f})) {
+    all.push_back({{x, 50, -5}, 1});
+    all.push_back({{50, x, -5}, 1});
+    all.push_back({{50, 0, x}, 1});
+    all.push_back({{50, 0, -5}, x});
+  }
+  expectRightList(frustumInput(box(), all));
+}
+
+TEST_F(CullingFrustum, NothingThatARaySeesIsCulled) {
+  const std::size_t count = generated("cullingScenes");
+  for (int kind = 0; kind < kSceneKinds; ++kind)
+    for (std::size_t s = 0; s < count; ++s) {
+      const Scene scene = generatedScene(static_cast<SceneKind>(kind), caseSeed() + s);
+      const auto kept = quicklyVisible(frustumInput(scene.camera, scene.bounds, scene.pad));
+      for (std::size_t i = 0; i < kept.size(); ++i)
+        EXPECT_TRUE(kept[i] || !scene.seen[i])
+            << fmt::format("object {} of scene {} of kind '{}' has visible pixels and is culled", i,
+                           s, nameOf(scene.kind));
+      checked(kept.size());
+    }
+}
+
+TEST_F(CullingFrustumLaws, TheOrderOfObjectsChangesNothing) {
+  const Scene scene = generatedScene(SceneKind::kField, caseSeed());
+  std::vector<Bounds> all = spheresAround(scene, 2 * kBlock + 5, caseSeed());
+  const std::vector<bool> forward = visible(frustumInput(scene.camera, all));
+  std::ranges::reverse(all);
+  std::vector<bool> backward = visible(frustumInput(scene.camera, all));
+  std::ranges::reverse(backward);
+  EXPECT_EQ(forward, backward);
+  checked(all.size());
+}
+
+TEST_F(CullingFrustumLaws, CullingTwiceChangesNothing) {
+  const Scene scene = generatedScene(SceneKind::kInfinite, caseSeed());
+  const std::vector<Bounds> all = spheresAround(scene, 2 * kBlock, caseSeed());
+  const std::vector<bool> once = visible(frustumInput(scene.camera, all));
+  std::vector<Bounds> left;
+  for (std::size_t i = 0; i < once.size(); ++i)
+    if (once[i]) left.push_back(all[i]);
+  ASSERT_GT(left.size(), all.size() / 10);
+  for (const bool again : visible(frustumInput(scene.camera, left))) EXPECT_TRUE(again);
+  checked(left.size());
+}
+
+TEST_F(CullingFrustumLaws, AWiderPadNeverCullsMore) {
+  const Scene scene = generatedScene(SceneKind::kField, caseSeed());
+  const std::vector<Bounds> all = spheresAround(scene, kBlock, caseSeed());
+  std::vector<bool> before(all.size());
+  for (const float pad : {0.0f, 0.1f, 1.0f, 100.0f}) {
+    const std::vector<bool> now = visible(frustumInput(scene.camera, all, pad));
+    for (std::size_t i = 0; i < now.size(); ++i) EXPECT_LE(before[i], now[i]) << pad;
+    before = now;
+    checked(all.size());
+  }
+}
+
+}  // namespace
+}  // namespace gnomon::culling

@@ -1,0 +1,277 @@
+#include "tests/culling/lists.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "harness/cases/random.h"
+#include "harness/verdict/list.h"
+#include "reference/culling/frustum.h"
+
+namespace gnomon::culling {
+namespace {
+
+std::size_t blocksOf(std::size_t candidates) {
+  return std::max<std::size_t>((candidates + kBlock - 1) / kBlock, 1);
+}
+
+std::string describe(const Bounds& b) {
+  return fmt::format("    centre ({:.9g}, {:.9g}, {:.9g})\n    radius {:.9g}\n", b.centre.x,
+                     b.centre.y, b.centre.z, b.radius);
+}
+
+template <class T>
+T membership(const FrustumInput& input, std::size_t i) {
+  return inFrustum<T>(input.camera[0], input.bounds[i], input.push);
+}
+
+struct OcclusionModel {
+  const OcclusionInput& input;
+  Pyramid pyramid;
+  std::vector<DrawCommand> survivors;
+
+  template <class T>
+  T membership(std::size_t i) const {
+    const uint object = survivors[i].firstInstance;
+    if (object >= input.push.objects) return T(1);
+    return unoccluded<T>(input.camera[0], input.bounds[object], input.push, pyramid);
+  }
+};
+
+/// A tally of the contract in a model's numbers.
+template <class T>
+struct Counts {
+  T tested{}, total{}, listed{}, overflowed{}, recounted{};
+  auto scalars() { return std::tie(tested, total, listed, overflowed, recounted); }
+};
+
+/// `member` says of one candidate whether it is visible, 1 or 0; of bounds both.
+template <class T, class Member>
+Counts<T> countsOf(std::size_t candidates, uint capacity, uint recounted, const Member& member) {
+  T total = T(0);
+  for (std::size_t i = 0; i < candidates; ++i) total = total + member.template operator()<T>(i);
+  const T most = T(capacity);
+  return {T(static_cast<uint>(candidates)), total, min(total, most),
+          select(total > most, T(1), T(0)), T(recounted)};
+}
+
+template <class Member>
+Expectation tallyOf(std::size_t candidates, uint capacity, uint recounted, Member member) {
+  return expectationOf(
+      "tally", 1,
+      [=]<class T>(std::size_t) { return countsOf<T>(candidates, capacity, recounted, member); },
+      [=](std::size_t) { return fmt::format("    {} candidates\n", candidates); });
+}
+
+/// The levels from the first on, as an image has them; one texel where there are none.
+std::vector<float> mipsOf(const Pyramid& pyramid) {
+  std::vector<float> texels;
+  for (std::size_t level = 1; level < pyramid.levels.size(); ++level)
+    texels.insert(texels.end(), pyramid.levels[level].begin(), pyramid.levels[level].end());
+  if (texels.empty()) texels.push_back(pyramid.levels[0][0]);
+  return texels;
+}
+
+}  // namespace
+
+FrustumInput frustumInput(const Camera& camera, std::vector<Bounds> bounds, float pad) {
+  const auto n = static_cast<uint>(bounds.size());
+  return {.camera = {camera},
+          .bounds = std::move(bounds),
+          .push = {.count = n, .capacity = n, .noNearPlane = 0, .pad = pad, .patience = kForever},
+          .commands = commandsFor(n)};
+}
+
+void parts(Parts& p, FrustumInput& input) {
+  p.push(input.push);
+  p.elements("camera", input.camera);
+  p.elements("bounds", input.bounds);
+  p.count(input.push.count, "bounds");
+}
+
+bool admits(const FrustumInput& input) {
+  return input.camera.size() == 1 && input.push.pad >= 0 && input.camera[0].near > 0;
+}
+
+OcclusionInput occlusionInput(const Camera& camera, std::vector<Bounds> bounds, Picture depth,
+                              float pad) {
+  const auto n = static_cast<uint>(bounds.size());
+  const uvec2 size = depth.size;
+  return {.camera = {camera},
+          .bounds = std::move(bounds),
+          .depth = std::move(depth),
+          .push = {.size = size,
+                   .objects = n,
+                   .candidates = n,
+                   .capacity = n,
+                   .pad = pad,
+                   .patience = kForever}};
+}
+
+void parts(Parts& p, OcclusionInput& input) {
+  p.push(input.push);
+  p.elements("camera", input.camera);
+  p.elements("bounds", input.bounds);
+  p.imageOfExtent("depth", input.depth);
+  p.extent(input.push.size);
+  p.count(input.push.objects, "bounds");
+}
+
+bool admits(const OcclusionInput& input) {
+  return input.camera.size() == 1 && input.push.pad >= 0 && input.camera[0].near > 0;
+}
+
+FrustumStimulus::FrustumStimulus(FrustumInput& input) {
+  input.commands = commandsFor(input.bounds.size());
+  stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
+                         {"bounds", std::as_bytes(std::span(input.bounds))},
+                         {"commands", std::as_bytes(std::span(input.commands))}},
+              .outputs = {{"draws", input.push.capacity, /*list=*/true}, {"tally", 1}},
+              .scratch = {{"scratch", kBlocks + blocksOf(input.bounds.size())}},
+              .push = std::as_bytes(std::span(&input.push, 1)),
+              .extent = {input.bounds.size()}};
+}
+
+OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
+    : pyramid(pyramidOf(input.depth)), levels(mipsOf(pyramid)) {
+  const std::vector<DrawCommand> all = commandsFor(input.bounds.size());
+  for (std::size_t i = 0; i < all.size(); i += input.stride) survivors.push_back(all[i]);
+  const auto n = static_cast<uint>(survivors.size());
+  input.push.candidates = n;
+  found = {
+      {.tested = input.push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0}};
+  const uvec2 size = max(input.push.size / 2u, uvec2(1));
+  const auto mips = static_cast<unsigned>(std::max<std::size_t>(pyramid.levels.size() - 1, 1));
+  stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
+                         {"bounds", std::as_bytes(std::span(input.bounds))},
+                         {"survivors", std::as_bytes(std::span(survivors))},
+                         {"found", std::as_bytes(std::span(found))}},
+              .outputs = {{"draws", input.push.capacity, /*list=*/true}, {"tally", 1}},
+              .scratch = {{"scratch", kBlocks + blocksOf(n)}},
+              .inputImages = {floatImage("depth", input.depth),
+                              {.image = "pyramid",
+                               .description = {.format = PixelFormat::kR32f,
+                                               .width = size.x,
+                                               .height = size.y,
+                                               .mips = mips},
+                               .texels = std::as_bytes(std::span(levels))}},
+              .push = std::as_bytes(std::span(&input.push, 1)),
+              .extent = {n}};
+}
+
+Trial ListCase::judged(FrustumInput& input) {
+  const FrustumStimulus given(input);
+  Observation seen = run(given.stimulus);
+  const KernelRecord& record = Session::current().subject(kernelName).record();
+  const std::size_t decided = !seen.applies ? 0
+                                            : decodeList(record, record.list("visible"),
+                                                         std::as_bytes(std::span(input.commands)),
+                                                         input.push.capacity, seen);
+  return {std::move(seen), expectationOf(
+                               "visible", decided,
+                               [&input]<class T>(std::size_t i) { return membership<T>(input, i); },
+                               [&input](std::size_t i) { return describe(input.bounds[i]); })};
+}
+
+Trial ListCase::judged(OcclusionInput& input) {
+  OcclusionStimulus given(input);
+  Observation seen = run(given.stimulus);
+  const KernelRecord& record = Session::current().subject(kernelName).record();
+  const std::size_t decided = !seen.applies ? 0
+                                            : decodeList(record, record.list("visible"),
+                                                         std::as_bytes(std::span(given.survivors)),
+                                                         input.push.capacity, seen);
+  const auto model = std::make_shared<const OcclusionModel>(
+      OcclusionModel{input, std::move(given.pyramid), std::move(given.survivors)});
+  return {
+      std::move(seen),
+      expectationOf(
+          "visible", decided, [model]<class T>(std::size_t i) { return model->membership<T>(i); },
+          [model](std::size_t i) {
+            return describe(model->input.bounds[model->survivors[i].firstInstance]);
+          })};
+}
+
+void ListCase::expectRightTally(FrustumInput input, uint recounted) {
+  const Observation seen = judged(input).seen;
+  expectConforms(seen,
+                 tallyOf(input.bounds.size(), input.push.capacity, recounted,
+                         [&input]<class T>(std::size_t i) { return membership<T>(input, i); }));
+}
+
+void ListCase::expectRightTally(OcclusionInput input, uint recounted) {
+  const Observation seen = judged(input).seen;
+  const OcclusionStimulus given(input);
+  const auto model =
+      std::make_shared<const OcclusionModel>(OcclusionModel{input, given.pyramid, given.survivors});
+  expectConforms(seen,
+                 tallyOf(model->survivors.size(), input.push.capacity, recounted,
+                         [model]<class T>(std::size_t i) { return model->membership<T>(i); }));
+}
+
+std::vector<bool> ListCase::visible(FrustumInput input) {
+  const Observation seen = judged(input).seen;
+  expectClean(seen);
+  if (!seen.applies) return {};
+  const auto flags = elementsOf<uint>(seen.twin.at("visible"));
+  return {flags.begin(), flags.end()};
+}
+
+std::vector<bool> ListCase::visible(OcclusionInput input) {
+  const Observation seen = judged(input).seen;
+  expectClean(seen);
+  if (!seen.applies) return {};
+  const auto flags = elementsOf<uint>(seen.twin.at("visible"));
+  return {flags.begin(), flags.end()};
+}
+
+std::vector<bool> ListCase::readList(const std::map<std::string, std::vector<std::byte>>& outputs,
+                                     std::size_t candidates, uint stride) const {
+  const auto draws = elementsOf<DrawCommand>(outputs.at("draws"));
+  const auto tally = elementsOf<Tally>(outputs.at("tally"));
+  std::vector<bool> all(candidates);
+  for (std::size_t i = 0; i < std::min<std::size_t>(tally[0].listed, draws.size()); ++i)
+    if (const std::size_t c = draws[i].firstInstance / stride; c < candidates) all[c] = true;
+  return all;
+}
+
+std::vector<bool> ListCase::quicklyVisible(FrustumInput input) {
+  const FrustumStimulus given(input);
+  return readList(runTwinOnce(Session::current().subject(kernelName), given.stimulus),
+                  input.bounds.size(), 1);
+}
+
+std::vector<bool> ListCase::quicklyVisible(OcclusionInput input) {
+  const OcclusionStimulus given(input);
+  return readList(runTwinOnce(Session::current().subject(kernelName), given.stimulus),
+                  given.survivors.size(), input.stride);
+}
+
+uint allRecounted(std::size_t candidates) {
+  const auto blocks = static_cast<uint>(blocksOf(candidates));
+  return blocks * (blocks - 1) / 2;
+}
+
+std::vector<Bounds> spheresAround(const Scene& scene, std::size_t n, std::uint64_t seed) {
+  Random random(seed);
+  const glm::dmat4 world = glm::inverse(scene.view);
+  std::vector<Bounds> spheres;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double u = random.uniform(-1.5, 1.5), v = random.uniform(-1.5, 1.5);
+    const double d = random.logUniform(0.3, 1000) * scene.near;
+    const glm::dmat4& p = scene.projection;
+    const glm::dvec3 at =
+        scene.perspective()
+            ? glm::dvec3((u + p[2][0]) / p[0][0] * d, (v + p[2][1]) / p[1][1] * d, -d)
+            : glm::dvec3((u - p[3][0]) / p[0][0], (v - p[3][1]) / p[1][1], -d);
+    const double most = scene.perspective() ? d : 1 / p[0][0];
+    spheres.push_back(
+        {vec3(world * glm::dvec4(at, 1)), static_cast<float>(most * random.logUniform(1e-4, 1))});
+  }
+  return spheres;
+}
+
+}  // namespace gnomon::culling
