@@ -11,8 +11,6 @@
 namespace gnomon::truth {
 namespace {
 
-constexpr std::size_t kFewest = 5;  // three parameters, and two degrees of freedom
-
 /// The least of f over [lo, hi]: the best of a grid, then the golden section around it.
 struct Least {
   double at = 0, value = 0;
@@ -104,7 +102,7 @@ double crossing(const Profile& profile, double limit, double inside, double outs
 }  // namespace
 
 std::optional<PowerLaw> fitPowerLaw(std::span<const Sample> samples, double confidence) {
-  if (samples.size() < kFewest) return std::nullopt;
+  if (samples.size() < kFewestSamples) return std::nullopt;
   const Profile profile(samples);
   const auto [exponent, squares] =
       leastOf([&](double b) { return profile.best(b).squares; }, kLeastExponent, kMostExponent);

@@ -25,10 +25,11 @@ struct PowerLaw {
 /// the least sum of squares with that exponent, S the least of all, m the number of samples and q
 /// Student's quantile on m - 3 degrees. Where the law is linear that is the usual interval; unlike
 /// that of the linearised law it knows that the fixed cost is no less than 0. Nothing where there
-/// are fewer than 5 samples, or where they do not show any growth: a constant fits as well, by the
-/// F test with the same confidence.
+/// are fewer than kFewestSamples, or where they do not show any growth: a constant fits as well, by
+/// the F test with the same confidence.
 std::optional<PowerLaw> fitPowerLaw(std::span<const Sample> samples, double confidence);
 
+inline constexpr std::size_t kFewestSamples = 5;  // three parameters, two degrees of freedom
 inline constexpr double kLeastExponent = 0.05;
 inline constexpr double kMostExponent = 4;
 
