@@ -18,10 +18,8 @@ void resolveFrame(benchmark::State& state, uint curve, const uvec2& size) {
 }
 
 void add(const char* name, uint curve, const uvec2& size) {
-  benchmark::RegisterBenchmark(name,
-                               [=](benchmark::State& state) { resolveFrame(state, curve, size); })
-      ->Unit(benchmark::kMicrosecond)
-      ->UseManualTime();
+  timed(benchmark::RegisterBenchmark(
+      name, [=](benchmark::State& state) { resolveFrame(state, curve, size); }));
 }
 
 const bool registered = [] {

@@ -1,27 +1,26 @@
 #include <algorithm>
-#include <fstream>
-#include <map>
 #include <regex>
+#include <set>
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
+#include "bench/objects.h"
+#include "bench/scaling.h"
+#include "bench/stopwatch.h"
+#include "harness/cli/baseline.h"
 #include "harness/cli/commands.h"
 #include "harness/error.h"
 #include "harness/isolate/worker.h"
 #include "harness/program/kernel.h"
 #include "harness/report/summary.h"
-#include "harness/report/terminal.h"
 
 namespace gnomon {
 namespace {
 
 constexpr int kRepetitions = 5;
-
-/// Real time of each benchmark in nanoseconds: the median of its repetitions.
-using Times = std::map<std::string, double>;
+constexpr const char* kObjects = "objects";
 
 /// Prints each benchmark as it ends and keeps its median.
 class Reporter : public benchmark::BenchmarkReporter {
@@ -40,84 +39,83 @@ class Reporter : public benchmark::BenchmarkReporter {
     }
   }
 
-  const Times& medians() const { return times; }
+  const std::vector<Outcome>& medians() const { return outcomes; }
 
  private:
   void keep(const Run& run) {
-    const std::string name = run.run_name.str();
-    const double ns =
-        run.GetAdjustedRealTime() / benchmark::GetTimeUnitMultiplier(run.time_unit) * 1e9;
-    times[name] = ns;
+    Outcome& outcome = outcomes.emplace_back();
+    outcome.name = run.run_name.str();
+    outcome.seconds = run.GetAdjustedRealTime() / benchmark::GetTimeUnitMultiplier(run.time_unit);
+    for (const auto& [name, counter] : run.counters) outcome.counters[name] = counter.value;
     const auto rate = [&](const char* counter, double unit) {
-      const auto found = run.counters.find(counter);
-      return found == run.counters.end() ? 0.0 : found->second.value / unit;
+      const auto found = outcome.counters.find(counter);
+      return found == outcome.counters.end() ? 0.0 : found->second / unit;
     };
-    terminal.print(fmt::format("{:<44} {:>10.2f} us  {:>9.2f} M items/s  {:>8.2f} GB/s", name,
-                               ns / 1000, rate("items_per_second", 1e6),
+    terminal.print(fmt::format("{:<44} {:>10.2f} us  {:>9.2f} M items/s  {:>8.2f} GB/s",
+                               outcome.name, outcome.seconds * 1e6, rate("items_per_second", 1e6),
                                rate("bytes_per_second", 1e9)));
   }
 
   Terminal& terminal;
-  Times times;
+  std::vector<Outcome> outcomes;
 };
 
-Times readBaseline(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  const auto json = nlohmann::json::parse(in, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("benchmarks"))
-    throw UsageError(fmt::format("{}: not a Google Benchmark JSON file", file.string()));
+Times timesOf(const std::vector<Outcome>& outcomes) {
   Times times;
-  static const std::map<std::string, double> kUnits = {
-      {"ns", 1}, {"us", 1e3}, {"ms", 1e6}, {"s", 1e9}};
-  for (const auto& b : json["benchmarks"]) {
-    if (!b.is_object() || b.value("aggregate_name", std::string()) != "median") continue;
-    const auto unit = kUnits.find(b.value("time_unit", std::string("ns")));
-    if (unit == kUnits.end() || !b.contains("real_time")) continue;
-    times[b.value("run_name", std::string())] = b.value("real_time", 0.0) * unit->second;
-  }
-  if (times.empty())
-    throw UsageError(
-        fmt::format("{}: holds no medians; write it with `gnomon bench --json`", file.string()));
+  for (const Outcome& o : outcomes) times[o.name] = o.seconds * 1e9;
   return times;
 }
 
-/// Prints both times of every benchmark; true where one is slower than the policy allows.
-bool slowerThan(const Times& before, const Times& now, double allowed, Terminal& terminal) {
-  std::vector<std::vector<std::string>> rows = {{"benchmark", "baseline", "now", "ratio"}};
-  bool slower = false;
-  for (const auto& [name, ns] : now) {
-    const auto found = before.find(name);
-    if (found == before.end()) {
-      rows.push_back({name, "none", fmt::format("{:.2f} us", ns / 1000), ""});
-      continue;
-    }
-    const double ratio = ns / found->second;
-    slower |= ratio > allowed;
-    rows.push_back({name, fmt::format("{:.2f} us", found->second / 1000),
-                    fmt::format("{:.2f} us", ns / 1000),
-                    terminal.paint(ratio > allowed ? Colour::kRed : Colour::kGreen,
-                                   fmt::format("{:.2f}", ratio))});
-  }
-  for (const auto& [name, ns] : before)
-    if (!now.contains(name)) {
-      rows.push_back({name, fmt::format("{:.2f} us", ns / 1000), "none", ""});
-      slower = true;
-    }
-  terminal.print(table(rows, "lrrr"));
-  if (slower)
-    terminal.print(fmt::format("slower than the baseline by more than {:.2f}, or gone", allowed));
-  return slower;
+bool runsObjects(const std::vector<std::string>& wanted) {
+  return wanted.empty() || std::ranges::find(wanted, kObjects) != wanted.end();
 }
 
-std::string pattern(const std::vector<std::string>& stages) {
-  if (stages.empty()) return ".*";
-  std::vector<std::string> known;
-  for (const KernelRecord* r : catalogue()) known.push_back(r->stage);
-  for (const std::string& s : stages)
-    if (std::ranges::find(known, s) == known.end())
+std::string pattern(const std::vector<std::string>& wanted) {
+  if (wanted.empty()) return ".*";
+  std::set<std::string> known = {kObjects};
+  for (const KernelRecord* r : catalogue()) known.insert(r->stage);
+  for (const std::string& s : wanted)
+    if (!known.contains(s))
       throw UsageError(
-          fmt::format("there is no benchmark '{}'.\nStages: {}", s, fmt::join(known, ", ")));
-  return fmt::format("^({})/", fmt::join(stages, "|"));
+          fmt::format("there is no benchmark '{}'.\nThere are: {}", s, fmt::join(known, ", ")));
+  return fmt::format("^({})/", fmt::join(wanted, "|"));
+}
+
+void refuseWhatNeedsObjects(const BenchOptions& options) {
+  if (runsObjects(options.stages)) return;
+  if (!options.plot.empty()) throw UsageError("--plot shows `gnomon bench objects`");
+  if (options.most) throw UsageError("--to is for `gnomon bench objects`");
+}
+
+/// The baseline's times of what is chosen, or nothing without one.
+Times chosenOf(const std::filesystem::path& baseline, const std::string& filter) {
+  if (baseline.empty()) return {};
+  Times before = readBaseline(baseline);
+  std::erase_if(before, [chosen = std::regex(filter)](const auto& b) {
+    return !std::regex_search(b.first, chosen);
+  });
+  return before;
+}
+
+std::string contextOf(const Stopwatch& watch) {
+  const auto text = [](double value) { return fmt::format("{:.6g}", value); };
+  benchmark::AddCustomContext("empty_dispatch_seconds", text(watch.emptySeconds()));
+  benchmark::AddCustomContext("copy_bytes_per_second", text(watch.copyBytesPerSecond()));
+  return fmt::format("caches cold; an empty dispatch takes {:.2f} us, a copy moves {:.2f} GB/s",
+                     watch.emptySeconds() * 1e6, watch.copyBytesPerSecond() * 1e-9);
+}
+
+/// Google Benchmark, told by its own flags.
+void runBenchmarks(const std::string& filter, const std::string& json, Reporter& reporter) {
+  std::vector<std::string> words = {"gnomon", "--benchmark_filter=" + filter,
+                                    fmt::format("--benchmark_repetitions={}", kRepetitions),
+                                    "--benchmark_min_time=0"};  // bench/timing.h repeats
+  if (!json.empty()) words.push_back("--benchmark_out=" + json);
+  std::vector<char*> argv;
+  for (std::string& w : words) argv.push_back(w.data());
+  int argc = static_cast<int>(argv.size());
+  benchmark::Initialize(&argc, argv.data());
+  benchmark::RunSpecifiedBenchmarks(&reporter);
 }
 
 }  // namespace
@@ -127,33 +125,32 @@ int bench(const BenchOptions& given) {
   options.session.root = sourceRoot();
   options.session.validation = false;  // its layer costs time that is not the kernel's
   const std::string filter = pattern(options.stages);
-  Times before = options.baseline.empty() ? Times{} : readBaseline(options.baseline);
-  std::erase_if(before, [chosen = std::regex(filter)](const auto& b) {
-    return !std::regex_search(b.first, chosen);
-  });
+  refuseWhatNeedsObjects(options);
+  const Times before = chosenOf(options.baseline, filter);
   for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
+  const std::string json = options.json == "-" ? "/dev/stdout" : options.json;
+  // Says so now if a file cannot be written, not after the work.
+  if (!json.empty()) writeText(json, "");
+  if (!options.plot.empty()) writeText(options.plot, "");
   Session session(options.session);
   // Somebody's file may crash or hang whoever compiles it: a worker finds out first.
   if (!options.session.kernels.empty()) prepare(options.session, session.policy());
   Terminal terminal(options.json == "-" ? stderr : stdout);
-  terminal.print(fmt::format("{}, {}", session.gpu().info().name, session.gpu().info().driver));
-
-  const std::string out = options.json == "-" ? "/dev/stdout" : options.json;
-  std::vector<std::string> words = {"gnomon", "--benchmark_filter=" + filter,
-                                    fmt::format("--benchmark_repetitions={}", kRepetitions),
-                                    "--benchmark_min_time=0.05"};
-  if (!out.empty()) {
-    writeText(out, "");  // says so now if it cannot be written, not after the work
-    words.push_back("--benchmark_out=" + out);
-  }
-  std::vector<char*> argv;
-  for (std::string& w : words) argv.push_back(w.data());
-  int argc = static_cast<int>(argv.size());
-  benchmark::Initialize(&argc, argv.data());
+  const std::string device =
+      fmt::format("{}, {}", session.gpu().info().name, session.gpu().info().driver);
+  const Stopwatch watch(session);
+  terminal.print(device + "\n" + contextOf(watch));
+  if (runsObjects(options.stages))
+    registerObjects(options.most.value_or(kMostObjects), options.session.seed);
   Reporter reporter(terminal);
-  benchmark::RunSpecifiedBenchmarks(&reporter);
+  runBenchmarks(filter, json, reporter);
+  if (const std::string report = scalingReport(reporter.medians()); !report.empty())
+    terminal.print("\n" + report);
+  if (!options.plot.empty())
+    writeText(options.plot, svgOf(scalingPlot(reporter.medians(), device)));
   if (options.baseline.empty()) return kGood;
-  return slowerThan(before, reporter.medians(), session.policy()["benchRegression"], terminal)
+  return slowerThan(before, timesOf(reporter.medians()), session.policy()["benchRegression"],
+                    terminal)
              ? kWrong
              : kGood;
 }

@@ -65,7 +65,9 @@ struct BenchOptions {
   SessionOptions session;
   std::vector<std::string> stages;
   std::filesystem::path baseline;
-  std::optional<unsigned> jobs{};  ///< taken, and not used: benchmarks run one at a time
+  std::optional<std::size_t> most{};  ///< objects
+  std::filesystem::path plot;         ///< SVG, where not empty
+  std::optional<unsigned> jobs{};     ///< taken, and not used: benchmarks run one at a time
   std::string json;
 };
 int bench(const BenchOptions& options);

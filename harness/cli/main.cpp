@@ -172,7 +172,18 @@ void addMutate(CLI::App& app, Action& action) {
 void addBench(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("bench", "GPU time of kernels, and how it scales");
   auto o = std::make_shared<BenchOptions>();
-  command->add_option("stages", o->stages, "STAGE (default: all)");
+  command->add_option(
+      "stages", o->stages,
+      "STAGE, or objects: culling of 100 to 1,000,000 objects in two worlds, beside "
+      "the CPU, and the law of its growth (default: all)");
+  command
+      ->add_option_function<std::size_t>(
+          "--to", [o](std::size_t n) { o->most = n; },
+          "The largest number of objects (default: 1,000,000)")
+      ->check(CLI::Range(std::size_t{100}, std::size_t{10'000'000}))
+      ->type_name("N");
+  command->add_option("--plot", o->plot, "Draw time by number of objects as SVG")
+      ->type_name("FILE");
   command
       ->add_option("--baseline", o->baseline,
                    "Compare with an earlier --json; exit 1 where slower than the policy allows")

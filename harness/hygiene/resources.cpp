@@ -208,9 +208,11 @@ Aftermath Resources::run(const GpuProgram& program, std::uint32_t poison) {
   return after;
 }
 
-double Resources::time(const GpuProgram& program) {
+double Resources::time(const GpuProgram& program, std::span<const Dispatch> before) {
   dispatch.program = &program;
-  return gpu.run({&dispatch, 1}, stimulus.limit).front() * 1e-9;
+  std::vector<Dispatch> list(before.begin(), before.end());
+  list.push_back(dispatch);
+  return gpu.run(list, stimulus.limit).back() * 1e-9;
 }
 
 void Resources::checkGuards(const Memory& m, const Bytes& whole, std::uint32_t poison,

@@ -70,8 +70,9 @@ class Resources {
   /// Inputs that are no longer what was uploaded: "wrote into its input, at samples[3].normal".
   std::vector<std::string> changedInputs() const;
 
-  /// Seconds on the device that one run takes, outputs left as they are.
-  double time(const GpuProgram& program);
+  /// Seconds on the device that one run takes, outputs left as they are; not counting what runs
+  /// before it in the same submission.
+  double time(const GpuProgram& program, std::span<const Dispatch> before = {});
 
   const std::vector<Output>& outputs() const { return out; }
   /// Of all that the contract names, each once: the least that has to move.

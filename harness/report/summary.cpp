@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "harness/error.h"
+#include "harness/report/xml.h"
 
 namespace gnomon {
 namespace {
@@ -107,41 +108,19 @@ nlohmann::json waivedOf(const KernelSummary& k) {
   return list;
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
-    }
-  }
-  return out;
-}
-
 std::string junitCase(const KernelSummary& k, const CaseRecord& r) {
   std::string text = fmt::format(R"(    <testcase classname="{}" name="{}" time="{:.3f}">)",
-                                 escaped(k.kernel), escaped(r.name), r.seconds);
+                                 escapedXml(k.kernel), escapedXml(r.name), r.seconds);
   if (r.waived)
-    text += fmt::format("\n      <skipped message=\"waived: {}\"/>", escaped(*r.waived));
+    text += fmt::format("\n      <skipped message=\"waived: {}\"/>", escapedXml(*r.waived));
   for (const std::string& m : r.waived ? std::vector<std::string>{} : r.messages)
     text += fmt::format("\n      <failure message=\"{}\">{}</failure>",
-                        escaped(m.substr(0, m.find('\n'))), escaped(m));
+                        escapedXml(m.substr(0, m.find('\n'))), escapedXml(m));
   if (r.unsupported)
-    text += fmt::format("\n      <skipped message=\"unsupported: {}\"/>", escaped(*r.unsupported));
+    text +=
+        fmt::format("\n      <skipped message=\"unsupported: {}\"/>", escapedXml(*r.unsupported));
   else if (r.skipped)
-    text += fmt::format("\n      <skipped message=\"{}\"/>", escaped(*r.skipped));
+    text += fmt::format("\n      <skipped message=\"{}\"/>", escapedXml(*r.skipped));
   return text + "</testcase>\n";
 }
 
@@ -233,7 +212,7 @@ std::string summaryJunit(const std::vector<KernelSummary>& kernels) {
   for (const KernelSummary& k : kernels) {
     text += fmt::format(
         "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" time=\"{:.3f}\">\n",
-        escaped(k.kernel), k.cases, k.failed, k.skipped + k.waived, k.seconds);
+        escapedXml(k.kernel), k.cases, k.failed, k.skipped + k.waived, k.seconds);
     for (const CaseRecord* r : k.records) text += junitCase(k, *r);
     text += "  </testsuite>\n";
   }

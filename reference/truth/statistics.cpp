@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include <mpfr.h>
@@ -48,6 +49,35 @@ double chiSquareTest(const std::vector<double>& observed, const std::vector<doub
 
 double sidak(double alpha, std::size_t n) {
   return -std::expm1(std::log1p(-alpha) / static_cast<double>(n));
+}
+
+double studentCdf(double x, unsigned degrees) {
+  const double nu = degrees, theta = std::atan(x / std::sqrt(nu));
+  const double c = std::cos(theta), s = std::sin(theta);
+  // The probability within [-x, x]; `term` is the next one of the series in powers of cos^2.
+  double sum = 0, term = degrees % 2 == 0 ? 1 : c;
+  for (unsigned k = degrees % 2 == 0 ? 0 : 1; k + 2 <= degrees; k += 2) {
+    sum += term;
+    term *= c * c * (k + 1) / (k + 2);
+  }
+  const double within = degrees % 2 == 0 ? s * sum : 2 / std::numbers::pi * (theta + s * sum);
+  return (1 + within) / 2;
+}
+
+double studentQuantile(double p, unsigned degrees) {
+  double lo = -1, hi = 1;
+  while (studentCdf(lo, degrees) > p) lo *= 2;
+  while (studentCdf(hi, degrees) < p) hi *= 2;
+  while (true) {
+    const double middle = (lo + hi) / 2;
+    if (middle <= lo || middle >= hi) return middle;
+    (studentCdf(middle, degrees) < p ? lo : hi) = middle;
+  }
+}
+
+double fQuantileOfTwo(double p, unsigned degrees) {
+  const double half = degrees / 2.0;
+  return half * std::expm1(-std::log1p(-p) / half);
 }
 
 }  // namespace gnomon::truth

@@ -1,4 +1,4 @@
-// Tests of hypotheses for samplers, done once and right.
+// Tests of hypotheses, done once and right.
 #pragma once
 
 #include <cstddef>
@@ -17,5 +17,16 @@ double chiSquareTest(const std::vector<double>& observed, const std::vector<doub
 /// The significance of one of n independent tests whose family-wise significance is alpha:
 /// 1 - (1 - alpha)^(1/n). Sidak 1967.
 double sidak(double alpha, std::size_t n);
+
+/// Probability that Student's t with that many degrees of freedom is at most x: the finite sums of
+/// Abramowitz and Stegun 1964, 26.7.3 and 26.7.4. degrees >= 1.
+double studentCdf(double x, unsigned degrees);
+
+/// The x with studentCdf(x, degrees) = p, 0 < p < 1.
+double studentQuantile(double p, unsigned degrees);
+
+/// The x that an F variable with 2 and that many degrees of freedom stays below with probability p:
+/// its distribution is 1 - (1 + 2 x / degrees)^(-degrees / 2).
+double fQuantileOfTwo(double p, unsigned degrees);
 
 }  // namespace gnomon::truth

@@ -1,0 +1,25 @@
+// Entries of stage culling on a city of a million objects.
+#include "bench/culling_case.h"
+#include "bench/objects.h"
+
+namespace gnomon::culling {
+namespace {
+
+using Timer = void (*)(benchmark::State&, const std::string&, const Case&);
+
+void add(const std::string& kernel, Timer timer) {
+  timed(benchmark::RegisterBenchmark((kernel + "/1000000").c_str(), [=](benchmark::State& state) {
+    timer(state, kernel, caseOf(WorldKind::kCity, kMostObjects, 1));
+  }));
+}
+
+const bool registered = [] {
+  for (const char* ending : {"", "_subgroups"}) {
+    add(std::string("culling/frustum") + ending, timeFrustum);
+    add(std::string("culling/occlusion") + ending, timeOcclusion);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace gnomon::culling

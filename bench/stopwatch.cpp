@@ -1,0 +1,76 @@
+#include "bench/stopwatch.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "harness/program/compile.h"
+
+namespace gnomon {
+namespace {
+
+Stopwatch* running = nullptr;
+
+constexpr std::size_t kMiB = 1u << 20;
+constexpr std::size_t kGroupBytes = 16 * 1024;  // of copy.comp
+constexpr int kCopies = 9, kEmpties = 31;       // odd: a median is one of them
+
+// Five times the largest cache of a GPU so far (50 MiB of L2).
+constexpr std::size_t kCopied = 256 * kMiB, kSwept = 256 * kMiB;
+
+// A software device copies at a few GB/s, and its host's last level of cache may hold hundreds of
+// MiB: what is swept is what its cores have of their own. "Cold" is half of the truth there.
+constexpr std::size_t kCopiedInSoftware = 64 * kMiB, kSweptInSoftware = 8 * kMiB;
+
+}  // namespace
+
+Stopwatch::Stopwatch(Session& s) : session(s) {
+  if (running != nullptr) throw std::logic_error("there is a stopwatch already");
+  Gpu& gpu = session.gpu();
+  const bool software = gpu.info().software;
+  const std::size_t bytes = software ? kCopiedInSoftware : kCopied;
+  const auto build = [&](const char* file, std::vector<BindingSlot> slots) {
+    return gpu.build({.spirv = compileShader(session.options().root / "bench" / file, {}),
+                      .slots = std::move(slots)});
+  };
+  copying = build("copy.comp", {{.binding = 0}, {.binding = 1}});
+  nothing = build("empty.comp", {});
+  from = gpu.allocate(bytes);
+  to = gpu.allocate(bytes);
+  gpu.fill(from, 1);
+  gpu.fill(to, 0);
+  sweep = {copyOf(software ? kSweptInSoftware : kSwept)};
+  running = this;
+  if (gpu.info().timestampPeriodNs == 0) return;
+  copied = 2 * static_cast<double>(bytes) / median(copyOf(bytes), kCopies);
+  empty = median({.program = &nothing}, kEmpties);
+}
+
+Stopwatch::~Stopwatch() { running = nullptr; }
+
+Stopwatch& Stopwatch::current() {
+  if (running == nullptr) throw std::logic_error("there is no stopwatch");
+  return *running;
+}
+
+double Stopwatch::cold(Resources& resources, const GpuProgram& program) const {
+  return resources.time(program, sweep);
+}
+
+Dispatch Stopwatch::copyOf(std::size_t bytes) const {
+  return {.program = &copying,
+          .buffers = {{.slot = {.binding = 0}, .buffer = &from},
+                      {.slot = {.binding = 1}, .buffer = &to}},
+          .groups = {static_cast<std::uint32_t>(bytes / kGroupBytes), 1, 1}};
+}
+
+double Stopwatch::median(const Dispatch& dispatch, int runs) const {
+  Gpu& gpu = session.gpu();
+  gpu.run({&dispatch, 1}, session.limit());  // pays for what the driver does once
+  std::vector<double> seconds;
+  for (int i = 0; i < runs; ++i)
+    seconds.push_back(gpu.run({&dispatch, 1}, session.limit()).front() * 1e-9);
+  std::ranges::nth_element(seconds, seconds.begin() + runs / 2);
+  return seconds[static_cast<std::size_t>(runs / 2)];
+}
+
+}  // namespace gnomon

@@ -1,0 +1,46 @@
+// What a benchmark's time is measured with, and what it is compared with: the device's own costs.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "harness/cases/session.h"
+#include "harness/hygiene/resources.h"
+
+namespace gnomon {
+
+/// One lives while benchmarks run.
+class Stopwatch {
+ public:
+  /// Compiles bench/copy.comp and bench/empty.comp, and times them; on a device without timestamps
+  /// nothing can be timed, and both are 0.
+  explicit Stopwatch(Session& session);
+  ~Stopwatch();
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+  /// Programmer error if there is none.
+  static Stopwatch& current();
+
+  /// Seconds on the device that one run takes with cold caches: another dispatch, in the same
+  /// submission, has read and written more than they hold just before.
+  double cold(Resources& resources, const GpuProgram& program) const;
+
+  /// Seconds that a dispatch takes which does nothing.
+  double emptySeconds() const { return empty; }
+
+  /// Bytes read and written in a second by a copy of a buffer onto another.
+  double copyBytesPerSecond() const { return copied; }
+
+ private:
+  Dispatch copyOf(std::size_t bytes) const;
+  double median(const Dispatch& dispatch, int runs) const;
+
+  Session& session;
+  GpuBuffer from, to;
+  GpuProgram copying, nothing;
+  std::vector<Dispatch> sweep;  ///< one
+  double empty = 0, copied = 0;
+};
+
+}  // namespace gnomon

@@ -1,0 +1,123 @@
+// `gnomon bench` as scripts rely on it: flags, JSON keys, the plot. Covered with few objects only;
+// times are no business of a test.
+#include <fstream>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/command/command.h"
+#include "tests/xml.h"
+
+namespace gnomon {
+namespace {
+
+std::string textOf(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Exit 2 before anything is timed, the culprit named.
+void expectUsageError(const std::string& arguments, const std::string& culprit) {
+  const Said said = gnomonSays("bench " + arguments);
+  EXPECT_EQ(said.status, 2) << arguments << "\n" << said.output;
+  EXPECT_NE(said.output.find(culprit), std::string::npos) << said.output;
+}
+
+TEST(Bench, NamesWhatIsWrongWithItsArguments) {
+  expectUsageError("objects --to many", "--to");
+  expectUsageError("objects --to 99", "--to");
+  expectUsageError("brdf --to 1000", "--to");
+  expectUsageError("brdf --plot x.svg", "--plot");
+  expectUsageError("objects --plot /no/such/folder/x.svg", "/no/such/folder/x.svg");
+  expectUsageError("no_such_stage", "objects");
+}
+
+/// One run for the tests below, since it casts millions of rays.
+class BenchObjects : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scratch = new Scratch;
+    said =
+        gnomonSays("bench objects --to 1000 --json " + file("o.json") + " --plot " + file("o.svg"));
+  }
+  static void TearDownTestSuite() { delete scratch; }
+  static std::string file(const char* name) { return (scratch->path() / name).string(); }
+
+  inline static Scratch* scratch = nullptr;
+  inline static Said said;
+};
+
+TEST_F(BenchObjects, WritesAWellFormedPlotOfBothWorlds) {
+  ASSERT_EQ(said.status, 0) << said.output;
+  const std::string svg = textOf(file("o.svg"));
+  EXPECT_EQ(xmlFault(svg), "");
+  for (const char* word : {">city<", ">field<", ">frustum<", ">occlusion<", ">cpu_bvh<", ">1,000<"})
+    EXPECT_NE(svg.find(word), std::string::npos) << word;
+}
+
+TEST_F(BenchObjects, WritesGoogleBenchmarksJsonWithItsCounters) {
+  ASSERT_EQ(said.status, 0) << said.output;
+  const auto json = nlohmann::json::parse(std::ifstream(file("o.json")));
+  for (const char* key : {"empty_dispatch_seconds", "copy_bytes_per_second"})
+    EXPECT_TRUE(json["context"].contains(key)) << key;
+  std::set<std::string> names;
+  for (const auto& b : json["benchmarks"]) {
+    const std::string name = b["run_name"];
+    names.insert(name.substr(0, name.rfind('/')));
+    for (const char* key : {"survivors", "culled", "draws_before", "draws_after"})
+      EXPECT_TRUE(b.contains(key)) << name << ": " << key;
+    if (name.find("cpu_") != name.npos) continue;
+    for (const char* key : {"bytes_per_second", "share_of_copy"})
+      EXPECT_TRUE(b.contains(key)) << name << ": " << key;
+  }
+  for (const char* world : {"city", "field"})
+    for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "occlusion"})
+      for (const char* objects : {"100", "316", "1000"})
+        EXPECT_TRUE(names.contains(std::string("objects/") + world + "/" + entry + "/" + objects))
+            << world << entry << objects;
+}
+
+TEST_F(BenchObjects, GpuAndCpuDrawTheSame) {
+  ASSERT_EQ(said.status, 0) << said.output;
+  const auto json = nlohmann::json::parse(std::ifstream(file("o.json")));
+  const auto drawn = [&](const std::string& name) {
+    for (const auto& b : json["benchmarks"])
+      if (b["run_name"].get<std::string>().starts_with(name + "/"))
+        return b["draws_after"].get<double>();
+    return -1.0;
+  };
+  for (const std::string world : {"objects/city/", "objects/field/"}) {
+    EXPECT_EQ(drawn(world + "cpu_none/1000"), 1000);
+    EXPECT_EQ(drawn(world + "cpu_frustum/1000"), drawn(world + "cpu_bvh/1000"));
+    EXPECT_EQ(drawn(world + "frustum/1000"), drawn(world + "cpu_bvh/1000"));
+    EXPECT_LE(drawn(world + "occlusion/1000"), drawn(world + "frustum/1000"));
+  }
+}
+
+TEST_F(BenchObjects, EndsWithATableAndTheLawOfEveryEntry) {
+  ASSERT_EQ(said.status, 0) << said.output;
+  const std::size_t head = said.output.find("t = c + a n^b");
+  ASSERT_NE(head, std::string::npos) << said.output;
+  const std::string table = said.output.substr(head);
+  for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "occlusion"})
+    EXPECT_NE(table.find(entry), std::string::npos) << entry;
+}
+
+TEST_F(BenchObjects, ComparesWithItsOwnBaseline) {
+  ASSERT_EQ(said.status, 0) << said.output;
+  // A hundred times as slow: the second run is slower than none of them, whatever the machine does
+  // besides.
+  auto json = nlohmann::json::parse(std::ifstream(file("o.json")));
+  for (auto& b : json["benchmarks"]) b["real_time"] = 100 * b["real_time"].get<double>();
+  std::ofstream(file("slow.json")) << json;
+  const Said again = gnomonSays("bench objects --to 1000 --baseline " + file("slow.json"));
+  EXPECT_EQ(again.status, 0) << again.output;
+  for (auto& b : json["benchmarks"]) b["real_time"] = 1e-6 * b["real_time"].get<double>();
+  std::ofstream(file("fast.json")) << json;
+  const Said slower = gnomonSays("bench objects --to 1000 --baseline " + file("fast.json"));
+  EXPECT_EQ(slower.status, 1) << slower.output;
+}
+
+}  // namespace
+}  // namespace gnomon
