@@ -200,7 +200,7 @@ TEST_P(GpuTest, PoolsGrowWithTheRunAndAreReused) {
   EXPECT_EQ(downloaded(*gpu, counters), Words(64, 144));
 }
 
-TEST_P(GpuTest, ARunOfNothingTakesNoTime) { EXPECT_EQ(gpu->run({}, kLimit).size(), 0u); }
+TEST_P(GpuTest, ARunOfNothingTakesNoTime) { EXPECT_EQ(gpu->run(std::span<const Dispatch>(), kLimit).size(), 0u); }
 
 TEST_P(GpuTest, PushAndSpecializationConstantsReachTheKernel) {
   ProgramDescription description = describe(R"(
