@@ -92,7 +92,9 @@ TEST_F(ReadbackTest, FramesComeBackInOrderWithWhatTheyMade) {
   GpuReadback readback(*gpu, 3, kBytes);
   std::uint32_t sent = 0;
   std::uint64_t after = 0;  // number of the next frame that may come
+  const auto start = Clock::now();
   while (after < 40) {
+    ASSERT_LT(Clock::now() - start, kDrawLimit) << sent << " frames sent, " << after << " back";
     if (submit(readback, filled(1000 + sent))) ++sent;
     const auto frame = readback.poll();
     if (!frame) continue;
