@@ -109,8 +109,13 @@ std::vector<unsigned> subgroupSizes(const VkPhysicalDeviceVulkan13Properties& pr
   return sizes;
 }
 
-GpuInfo describe(const Properties& properties, const FeatureChain& features,
-                 unsigned timestampBits) {
+struct Queue {
+  std::uint32_t family = 0;
+  unsigned timestampBits = 0;
+  bool graphics = false;
+};
+
+GpuInfo describe(const Properties& properties, const FeatureChain& features, const Queue& queue) {
   const VkPhysicalDeviceProperties& core = properties.core.properties;
   GpuInfo info;
   info.name = core.deviceName;
@@ -125,19 +130,14 @@ GpuInfo describe(const Properties& properties, const FeatureChain& features,
   info.maxGroupSubgroups = properties.v13.maxComputeWorkgroupSubgroups;
   info.roundingRteFloat32 = canDeclareRte(properties.v12);
   info.signedZeroInfNanFloat32 = properties.v12.shaderSignedZeroInfNanPreserveFloat32 == VK_TRUE;
-  info.timestampPeriodNs = timestampBits == 0 ? 0 : core.limits.timestampPeriod;
+  info.timestampPeriodNs = queue.timestampBits == 0 ? 0 : core.limits.timestampPeriod;
   fillLimits(core.limits, info);
   info.features = namesOf(features);
   nameSubgroupFeatures(properties.v11, info.features);
-  info.features["timestamps"] = timestampBits != 0;
+  info.features["timestamps"] = queue.timestampBits != 0;
+  info.features["graphicsQueue"] = queue.graphics;
   return info;
 }
-
-struct Queue {
-  std::uint32_t family = 0;
-  unsigned timestampBits = 0;
-  bool graphics = false;
-};
 
 /// A family that can draw too where there is one: stages with draws need both.
 std::optional<Queue> computeQueue(VkPhysicalDevice device) {
@@ -177,10 +177,10 @@ std::vector<Adapter> adaptersOf(const Instance& instance) {
     adapter.has13 = apiVersion(device) >= VK_API_VERSION_1_3;
     adapter.queueFamily = queue->family;
     adapter.timestampBits = queue->timestampBits;
-    adapter.graphics = queue->graphics;
     const Properties properties = propertiesOf(device, adapter.has13);
     adapter.limits = properties.core.properties.limits;
-    adapter.info = describe(properties, featuresOf(device, adapter.has13), queue->timestampBits);
+    adapter.features = featuresOf(device, adapter.has13);
+    adapter.info = describe(properties, adapter.features, *queue);
     adapter.info.index = static_cast<int>(adapters.size());
     adapters.push_back(std::move(adapter));
   }

@@ -1,6 +1,8 @@
 // Which optional features a Gpu enables: every one of these that the device has.
 #include "harness/vulkan/internal.h"
 
+#include <algorithm>
+
 namespace gnomon::vulkan {
 namespace {
 
@@ -111,6 +113,12 @@ void copyListed(const Structure& from, Structure& to) {
 }
 
 template <typename Structure>
+void dropListed(const std::vector<std::string>& names, Structure& from) {
+  for (const auto& [name, member] : Features<Structure>::kAll)
+    if (std::ranges::find(names, name) != names.end()) from.*member = VK_FALSE;
+}
+
+template <typename Structure>
 void nameListed(const Structure& from, std::map<std::string, bool>& names) {
   for (const auto& [name, member] : Features<Structure>::kAll)
     names[name] = from.*member == VK_TRUE;
@@ -139,6 +147,13 @@ FeatureChain featuresOf(VkPhysicalDevice device, bool has13) {
   copyListed(all.v12, listed.v12);
   copyListed(all.v13, listed.v13);
   return listed;
+}
+
+void drop(const std::vector<std::string>& names, FeatureChain& features) {
+  dropListed(names, features.core.features);
+  dropListed(names, features.v11);
+  dropListed(names, features.v12);
+  dropListed(names, features.v13);
 }
 
 std::map<std::string, bool> namesOf(const FeatureChain& features) {

@@ -7,28 +7,17 @@
 #include <fmt/format.h>
 
 #include "harness/error.h"
-#include "harness/vulkan/internal.h"
+#include "harness/vulkan/impl.h"
 
 namespace gnomon {
 
 using vulkan::Device;
-
-struct GpuBuffer::Impl {
-  std::shared_ptr<Device> device;  // declared first: the buffer goes before its device
-  vulkan::Buffer buffer;
-  std::size_t size = 0;
-};
 
 GpuBuffer::GpuBuffer() = default;
 GpuBuffer::~GpuBuffer() = default;
 GpuBuffer::GpuBuffer(GpuBuffer&&) noexcept = default;
 GpuBuffer& GpuBuffer::operator=(GpuBuffer&&) noexcept = default;
 std::size_t GpuBuffer::size() const { return impl ? impl->size : 0; }
-
-struct GpuImage::Impl {
-  std::shared_ptr<Device> device;  // declared first, as above
-  vulkan::Image image;
-};
 
 GpuImage::GpuImage() = default;
 GpuImage::~GpuImage() = default;
@@ -39,32 +28,20 @@ const ImageDescription& GpuImage::description() const {
   return impl ? impl->image.description : none;
 }
 
-struct GpuSampler::Impl {
-  std::shared_ptr<Device> device;  // declared first, as above
-  vulkan::OwnedSampler sampler;
-  SamplerDescription description;
-};
-
 GpuSampler::GpuSampler() = default;
 GpuSampler::~GpuSampler() = default;
 GpuSampler::GpuSampler(GpuSampler&&) noexcept = default;
 GpuSampler& GpuSampler::operator=(GpuSampler&&) noexcept = default;
-
-struct GpuProgram::Impl {
-  vulkan::Program program;
-};
 
 GpuProgram::GpuProgram() = default;
 GpuProgram::~GpuProgram() = default;
 GpuProgram::GpuProgram(GpuProgram&&) noexcept = default;
 GpuProgram& GpuProgram::operator=(GpuProgram&&) noexcept = default;
 
-struct Gpu::Impl {
-  std::shared_ptr<Device> device;
-  vulkan::Runner runner;
-
-  explicit Impl(std::shared_ptr<Device> opened) : device(opened), runner(opened) {}
-};
+GpuDrawProgram::GpuDrawProgram() = default;
+GpuDrawProgram::~GpuDrawProgram() = default;
+GpuDrawProgram::GpuDrawProgram(GpuDrawProgram&&) noexcept = default;
+GpuDrawProgram& GpuDrawProgram::operator=(GpuDrawProgram&&) noexcept = default;
 
 namespace {
 
@@ -73,24 +50,14 @@ std::shared_ptr<Device> open(const Gpu::Options& options) {
   const std::vector<vulkan::Adapter> adapters = vulkan::adaptersOf(*instance);
   std::vector<GpuInfo> gpus;
   for (const vulkan::Adapter& adapter : adapters) gpus.push_back(adapter.info);
-  const std::size_t chosen = chooseGpu(gpus, options.device);
+  vulkan::Adapter adapter = adapters[chooseGpu(gpus, options.device)];
+  vulkan::drop(options.without, adapter.features);
+  for (const std::string& feature : options.without) adapter.info.features.at(feature) = false;
   try {
-    return std::make_shared<Device>(std::move(instance), adapters[chosen], options.staged);
+    return std::make_shared<Device>(std::move(instance), adapter, options.staged);
   } catch (const GpuError& error) {
-    throw DeviceError(fmt::format("{}: {}", gpus[chosen].name, error.what()));
+    throw DeviceError(fmt::format("{}: {}", adapter.info.name, error.what()));
   }
-}
-
-void requireInside(const GpuBuffer& buffer, std::size_t offset, std::size_t bytes) {
-  if (offset > buffer.size() || bytes > buffer.size() - offset)
-    throw std::out_of_range(fmt::format("bytes {} to {} of a GPU buffer of {} bytes", offset,
-                                        offset + bytes, buffer.size()));
-}
-
-void requireInside(const ImageDescription& image, unsigned layer, unsigned mip) {
-  if (layer >= image.layers || mip >= image.mips)
-    throw std::out_of_range(fmt::format("layer {}, mip {} of a GPU image of {} and {}", layer, mip,
-                                        image.layers, image.mips));
 }
 
 void requireBytes(const ImageDescription& image, unsigned layer, unsigned mip, std::size_t bytes) {
@@ -178,17 +145,18 @@ void requireUse(const vulkan::Adapter& adapter, const vulkan::Image& image, Bind
 
 /// A slot without a buffer or image, or a push range without values, is undefined behaviour in the
 /// driver.
-void requireComplete(const vulkan::Program& program, const Dispatch& dispatch) {
-  if (dispatch.push.size() != program.pushBytes)
-    throw std::logic_error(fmt::format("{} bytes of push constants for a program of {}",
-                                       dispatch.push.size(), program.pushBytes));
+void requireComplete(const vulkan::Program& program, std::span<const BoundBuffer> buffers,
+                     std::span<const BoundImage> images, std::size_t pushBytes) {
+  if (pushBytes != program.pushBytes)
+    throw std::logic_error(fmt::format("{} bytes of push constants for a program of {}", pushBytes,
+                                       program.pushBytes));
   for (const BindingSlot& slot : program.slots)
-    if ((takesBuffer(slot) ? std::ranges::count(dispatch.buffers, slot, &BoundBuffer::slot)
-                           : std::ranges::count(dispatch.images, slot, &BoundImage::slot)) != 1)
+    if ((takesBuffer(slot) ? std::ranges::count(buffers, slot, &BoundBuffer::slot)
+                           : std::ranges::count(images, slot, &BoundImage::slot)) != 1)
       throw std::logic_error(fmt::format("the {} must be bound once", textOf(slot)));
-  if (dispatch.buffers.size() + dispatch.images.size() != program.slots.size())
+  if (buffers.size() + images.size() != program.slots.size())
     throw std::logic_error("a buffer or image is bound where the program has no slot");
-  for (const BoundImage& bound : dispatch.images)
+  for (const BoundImage& bound : images)
     if (takesImage(bound.slot) != (bound.image != nullptr) ||
         takesSampler(bound.slot) != (bound.sampler != nullptr))
       throw std::logic_error(fmt::format("the {} takes {} and {}", textOf(bound.slot),
@@ -206,6 +174,60 @@ int mipOf(const BoundImage& bound, unsigned k) {
 }
 
 }  // namespace
+
+void requireInside(const GpuBuffer& buffer, std::size_t offset, std::size_t bytes) {
+  if (offset > buffer.size() || bytes > buffer.size() - offset)
+    throw std::out_of_range(fmt::format("bytes {} to {} of a GPU buffer of {} bytes", offset,
+                                        offset + bytes, buffer.size()));
+}
+
+void requireInside(const ImageDescription& image, unsigned layer, unsigned mip) {
+  if (layer >= image.layers || mip >= image.mips)
+    throw std::out_of_range(fmt::format("layer {}, mip {} of a GPU image of {} and {}", layer, mip,
+                                        image.layers, image.mips));
+}
+
+vulkan::Command Gpu::Impl::bound(Device& device, const vulkan::Program& program,
+                                 std::span<const BoundBuffer> buffers,
+                                 std::span<const BoundImage> images,
+                                 std::span<const std::byte> push) {
+  requireComplete(program, buffers, images, push.size());
+  vulkan::Command command{.program = &program, .buffers = {}, .images = {}, .push = push};
+  for (const BoundBuffer& bound : buffers) {
+    requireLimits(device.adapter, bound);
+    command.buffers.push_back(
+        {bound.slot, {handleOf(*bound.buffer), bound.offset, rangeOf(bound)}});
+  }
+  for (const BoundImage& bound : images) {
+    VkDescriptorImageInfo view{};
+    view.imageLayout = VK_IMAGE_LAYOUT_GENERAL;
+    if (bound.sampler != nullptr) view.sampler = bound.sampler->impl->sampler.get();
+    vulkan::BoundView& views =
+        command.images.emplace_back(vulkan::BoundView{bound.slot, {bound.slot.count, view}});
+    if (bound.image == nullptr) continue;
+    vulkan::Image& image = bound.image->impl->image;
+    requireUse(device.adapter, image, bound.slot.kind,
+               bound.sampler == nullptr ? SamplerDescription{} : bound.sampler->impl->description);
+    for (unsigned k = 0; k < bound.slot.count; ++k)
+      views.images[k].imageView = device.viewOf(image, {mipOf(bound, k), bound.asArray});
+  }
+  return command;
+}
+
+vulkan::Command Gpu::Impl::resolve(Device& device, const Dispatch& dispatch) {
+  requireLimits(device.adapter, dispatch.groups);
+  vulkan::Command command = bound(device, dispatch.program->impl->program, dispatch.buffers,
+                                  dispatch.images, dispatch.push);
+  command.groups = dispatch.groups;
+  return command;
+}
+
+std::vector<vulkan::Command> Gpu::Impl::resolve(Device& device, std::span<const Work> work) {
+  std::vector<vulkan::Command> commands;
+  for (const Work& step : work)
+    commands.push_back(std::visit([&](const auto* one) { return resolve(device, *one); }, step));
+  return commands;
+}
 
 Gpu::Gpu(const Options& options) : impl(std::make_unique<Impl>(open(options))) {}
 Gpu::~Gpu() = default;
@@ -283,37 +305,23 @@ GpuProgram Gpu::build(const ProgramDescription& description) {
   return program;
 }
 
+GpuDrawProgram Gpu::build(const DrawProgramDescription& description) {
+  GpuDrawProgram program;
+  program.impl = std::make_unique<GpuDrawProgram::Impl>();
+  program.impl->drawn = vulkan::makeDrawProgram(impl->device, description);
+  return program;
+}
+
 std::vector<double> Gpu::run(std::span<const Dispatch> dispatches,
                              std::chrono::milliseconds limit) {
-  std::vector<vulkan::Command> commands;
-  for (const Dispatch& dispatch : dispatches) {
-    vulkan::Command& command = commands.emplace_back();
-    command.program = &dispatch.program->impl->program;
-    command.dispatch = &dispatch;
-    requireComplete(*command.program, dispatch);
-    requireLimits(impl->device->adapter, dispatch.groups);
-    for (const BoundBuffer& bound : dispatch.buffers) {
-      requireLimits(impl->device->adapter, bound);
-      command.buffers.push_back(
-          {bound.slot, {bound.buffer->impl->buffer.buffer.get(), bound.offset, rangeOf(bound)}});
-    }
-    for (const BoundImage& bound : dispatch.images) {
-      VkDescriptorImageInfo view{};
-      view.imageLayout = VK_IMAGE_LAYOUT_GENERAL;
-      if (bound.sampler != nullptr) view.sampler = bound.sampler->impl->sampler.get();
-      vulkan::BoundView& views =
-          command.images.emplace_back(vulkan::BoundView{bound.slot, {bound.slot.count, view}});
-      if (bound.image == nullptr) continue;
-      vulkan::Image& image = bound.image->impl->image;
-      requireUse(
-          impl->device->adapter, image, bound.slot.kind,
-          bound.sampler == nullptr ? SamplerDescription{} : bound.sampler->impl->description);
-      for (unsigned k = 0; k < bound.slot.count; ++k)
-        views.images[k].imageView = impl->device->viewOf(image, {mipOf(bound, k), bound.asArray});
-    }
-  }
-  if (commands.empty()) return {};
-  return impl->runner.run(commands, limit);
+  std::vector<Work> work;
+  for (const Dispatch& dispatch : dispatches) work.push_back(&dispatch);
+  return run(work, limit);
+}
+
+std::vector<double> Gpu::run(std::span<const Work> work, std::chrono::milliseconds limit) {
+  if (work.empty()) return {};
+  return impl->runner.run(Impl::resolve(*impl->device, work), limit);
 }
 
 bool Gpu::alive() const { return !impl->device->owner.hung && !impl->device->owner.lost; }

@@ -1,5 +1,5 @@
 // The only door to Vulkan: devices, buffers, images, programs, dispatches, timestamps, validation
-// messages.
+// messages. What draws and what is read back without waiting stand in draw.h and readback.h.
 // No Vulkan type appears here, so no other folder needs a Vulkan header.
 #pragma once
 
@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 namespace gnomon {
@@ -42,9 +43,10 @@ struct GpuInfo {
   unsigned subTexelBits = 0;    ///< of the fraction that weights texels, subTexelPrecisionBits
   unsigned mipmapBits = 0;      ///< of the fraction that weights mip levels, mipmapPrecisionBits
   /// Optional features by the names of the Vulkan structures ("shaderFloat64",
-  /// "scalarBlockLayout", "drawIndirectCount"), and "timestamps", "subgroupBasic", "subgroupVote",
-  /// "subgroupArithmetic", "subgroupBallot", "subgroupShuffle", "subgroupShuffleRelative",
-  /// "subgroupClustered", "subgroupQuad" (in compute): what the device has and a Gpu enables.
+  /// "scalarBlockLayout", "drawIndirectCount"), and "timestamps", "graphicsQueue" (a queue that
+  /// draws), "subgroupBasic", "subgroupVote", "subgroupArithmetic", "subgroupBallot",
+  /// "subgroupShuffle", "subgroupShuffleRelative", "subgroupClustered", "subgroupQuad" (in
+  /// compute): what the device has and a Gpu enables.
   std::map<std::string, bool> features{};
 
   /// Why a kernel that asks for these features cannot run, or nothing.
@@ -113,7 +115,7 @@ std::size_t mipBytes(const ImageDescription& image, unsigned mip);
 unsigned fullMipCount(unsigned width, unsigned height);
 
 /// A two-dimensional image, array or cube map on the device. Moves; frees itself. Kernels may
-/// sample it, and store to it where the device can store to its format.
+/// sample it, and store and draw to it where the device can do that with its format.
 class GpuImage {
  public:
   GpuImage();
@@ -155,7 +157,7 @@ class GpuSampler {
   std::unique_ptr<Impl> impl;
 };
 
-/// What a compute pipeline binds at one place.
+/// What a pipeline binds at one place.
 struct BindingSlot {
   enum class Kind {
     kStorageBuffer,
@@ -199,7 +201,7 @@ struct ProgramDescription {
 /// As a range: all of the buffer from the offset on.
 inline constexpr std::size_t kWholeBuffer = ~std::size_t{0};
 
-/// One buffer, or a part of it, bound for a dispatch.
+/// One buffer, or a part of it, bound for a dispatch or a draw.
 struct BoundBuffer {
   BindingSlot slot;
   const GpuBuffer* buffer = nullptr;
@@ -208,9 +210,9 @@ struct BoundBuffer {
   std::size_t range = kWholeBuffer;
 };
 
-/// One image, sampler, or both, bound for a dispatch. The kernel sees the image as what it is: 2D,
-/// a 2D array if it has several layers, a cube map, or an array of them. In an array of descriptors
-/// each sees one mip level: the k-th level k, those past the last level that one.
+/// One image, sampler, or both, bound for a dispatch or a draw. The kernel sees the image as what
+/// it is: 2D, a 2D array if it has several layers, a cube map, or an array of them. In an array of
+/// descriptors each sees one mip level: the k-th level k, those past the last level that one.
 struct BoundImage {
   BindingSlot slot;
   const GpuImage* image = nullptr;      ///< none at a kSampler
@@ -231,7 +233,15 @@ struct Dispatch {
   std::array<std::uint32_t, 3> groups{1, 1, 1};
 };
 
-/// One opened device with one compute queue. Not thread-safe: one thread talks to a Gpu.
+struct Draw;                    // draw.h
+struct DrawProgramDescription;  // likewise
+class GpuDrawProgram;           // likewise
+
+/// One step of a submission.
+using Work = std::variant<const Dispatch*, const Draw*>;
+
+/// One opened device with one queue, for draws too where the device has such a one. Not
+/// thread-safe: one thread talks to a Gpu.
 class Gpu {
  public:
   struct Options {
@@ -240,6 +250,9 @@ class Gpu {
     /// Copy through a staging buffer, as on discrete GPUs, even where the host can map the
     /// device's memory: so that a software device can test that way.
     bool staged = false;
+    /// Features that the device has and that shall not be used, so that a device can test what
+    /// another one lacks.
+    std::vector<std::string> without{};
   };
 
   /// Opens the device that the options choose. Throws DeviceError: none there, several match,
@@ -284,6 +297,10 @@ class Gpu {
   /// (more sets or push constants than the device has) or GpuError (the driver refuses). That the
   /// slots cover what the entry point uses is the caller's promise; reflect() tells.
   GpuProgram build(const ProgramDescription& description);
+  /// The same of a graphics pipeline. Throws Unsupported also without a graphics queue, dynamic
+  /// rendering or shaderDrawParameters where a stage asks for it, and where a format is none to
+  /// draw to.
+  GpuDrawProgram build(const DrawProgramDescription& description);
 
   /// Runs the dispatches in order with full memory barriers between them and waits, at most
   /// `limit`. Returns the GPU time of each in nanoseconds (0 without timestamps). Throws GpuError
@@ -292,6 +309,10 @@ class Gpu {
   /// filtering one through a kCombined), and std::logic_error where buffers, images or push
   /// constants are not those of the program.
   std::vector<double> run(std::span<const Dispatch> dispatches, std::chrono::milliseconds limit);
+  /// The same of dispatches and draws. Throws Unsupported also for a way to draw that the device
+  /// lacks, std::logic_error where targets, indices or commands are not what the program and the
+  /// draw say, and std::out_of_range where they lie past the end of their buffer.
+  std::vector<double> run(std::span<const Work> work, std::chrono::milliseconds limit);
 
   /// False once the device was lost or a wait ran out; a new Gpu is needed. What belongs to a
   /// device whose wait ran out is leaked, since work may still use it.
@@ -301,6 +322,7 @@ class Gpu {
   std::vector<std::string> takeMessages();
 
  private:
+  friend class GpuReadback;
   struct Impl;
   std::unique_ptr<Impl> impl;
 };

@@ -65,17 +65,13 @@ VkImageAspectFlags aspectOf(PixelFormat format) {
   return format == PixelFormat::kD32 ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT;
 }
 
-VkFormatFeatureFlags formatFeatures(const Adapter& adapter, PixelFormat format) {
-  VkFormatProperties properties{};
-  vkGetPhysicalDeviceFormatProperties(adapter.handle, formatOf(format).vulkan, &properties);
-  return properties.optimalTilingFeatures;
-}
-
-/// Every use that the format can have here; depth can also be drawn to.
+/// Every use that the format can have here.
 VkImageUsageFlags usageOf(PixelFormat format, VkFormatFeatureFlags features) {
   VkImageUsageFlags usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
                             VK_IMAGE_USAGE_TRANSFER_DST_BIT;
   if ((features & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) != 0) usage |= VK_IMAGE_USAGE_STORAGE_BIT;
+  if ((features & VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT) != 0)
+    usage |= VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
   if (format == PixelFormat::kD32) usage |= VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT;
   return usage;
 }
@@ -106,7 +102,7 @@ void requireSupported(const Adapter& adapter, const ImageDescription& image,
   const VkResult result = vkGetPhysicalDeviceImageFormatProperties(
       adapter.handle, info.format, info.imageType, info.tiling, info.usage, info.flags, &most);
   if (result == VK_ERROR_FORMAT_NOT_SUPPORTED ||
-      (image.format == PixelFormat::kD32 && !adapter.graphics))
+      (image.format == PixelFormat::kD32 && !adapter.info.features.at("graphicsQueue")))
     throw Unsupported(fmt::format("{} of {} is not supported by {}",
                                   image.cube ? "sampled cube image" : "sampled image", format,
                                   adapter.info.name));
@@ -179,6 +175,14 @@ VkSamplerAddressMode addressMode(SamplerDescription::Address address) {
 }
 
 }  // namespace
+
+VkFormat vulkanFormat(PixelFormat format) { return formatOf(format).vulkan; }
+
+VkFormatFeatureFlags formatFeatures(const Adapter& adapter, PixelFormat format) {
+  VkFormatProperties properties{};
+  vkGetPhysicalDeviceFormatProperties(adapter.handle, vulkanFormat(format), &properties);
+  return properties.optimalTilingFeatures;
+}
 
 Image Device::makeImage(const ImageDescription& description) {
   requireAlive();
@@ -255,13 +259,18 @@ VkImageView Device::viewOf(Image& image, const Image::View& wanted) {
   VkImageViewCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;
   info.image = image.image.get();
-  info.viewType = viewType(image.description, wanted.asArray);
+  info.viewType =
+      wanted.layer < 0 ? viewType(image.description, wanted.asArray) : VK_IMAGE_VIEW_TYPE_2D;
   info.format = formatOf(image.description.format).vulkan;
   info.subresourceRange = {aspectOf(image.description.format), 0, VK_REMAINING_MIP_LEVELS, 0,
                            VK_REMAINING_ARRAY_LAYERS};
   if (wanted.mip >= 0) {
     info.subresourceRange.baseMipLevel = static_cast<std::uint32_t>(wanted.mip);
     info.subresourceRange.levelCount = 1;
+  }
+  if (wanted.layer >= 0) {
+    info.subresourceRange.baseArrayLayer = static_cast<std::uint32_t>(wanted.layer);
+    info.subresourceRange.layerCount = 1;
   }
   VkImageView made = VK_NULL_HANDLE;
   check(vkCreateImageView(owner.handle, &info, nullptr, &made), "vkCreateImageView");

@@ -1,7 +1,4 @@
 // Inside harness/vulkan: the instance, the device, what it owns. No other folder includes this.
-//
-// Where things go that are not here yet: graphics pipelines are further programs that run.cpp
-// records; what they draw to are images (image.cpp) with a further usage.
 #pragma once
 
 #include <array>
@@ -11,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,6 +16,7 @@
 
 #include <vulkan/vulkan.h>
 
+#include "harness/vulkan/draw.h"
 #include "harness/vulkan/gpu.h"
 
 namespace gnomon::vulkan {
@@ -74,6 +73,9 @@ struct FeatureChain {
 /// The listed features that the device has: what a Gpu enables.
 FeatureChain featuresOf(VkPhysicalDevice device, bool has13);
 
+/// As if the device lacked the features of these names.
+void drop(const std::vector<std::string>& names, FeatureChain& features);
+
 /// The listed features by name, true where the device has them.
 std::map<std::string, bool> namesOf(const FeatureChain& features);
 
@@ -81,11 +83,11 @@ std::map<std::string, bool> namesOf(const FeatureChain& features);
 struct Adapter {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   GpuInfo info;
+  FeatureChain features;
   VkPhysicalDeviceLimits limits{};
   bool has13 = false;
   std::uint32_t queueFamily = 0;
   unsigned timestampBits = 0;  ///< of its queue; 0: no timestamps
-  bool graphics = false;       ///< its queue can draw too
 };
 
 /// In the loader's order.
@@ -171,12 +173,38 @@ struct Image {
   struct View {
     int mip = -1;  ///< -1: all
     bool asArray = false;
+    int layer = -1;  ///< the only one seen, as 2D; -1: all
     auto operator<=>(const View&) const = default;
   };
   std::map<View, OwnedImageView> views;  ///< made when first bound
 };
 
-/// The device, its queue, and one command buffer that is recorded and waited for at once.
+/// A command buffer on its way through the queue. Submissions run in the order of submit().
+class Submission {
+ public:
+  Submission(DeviceHandle& device, std::uint32_t family);
+
+  /// Starts recording; the last submission must be done. All that was written before is visible to
+  /// what is recorded.
+  VkCommandBuffer begin();
+  /// Hands over what was recorded; once it is done its results are visible to the host.
+  void submit();
+  bool done() const;
+  /// Throws GpuError on loss, or when the limit passes, and then gives the device up.
+  void wait(std::chrono::milliseconds limit);
+
+ private:
+  DeviceHandle* owner = nullptr;
+  VkQueue queue = VK_NULL_HANDLE;
+  OwnedCommandPool pool;
+  VkCommandBuffer recorded = VK_NULL_HANDLE;
+  OwnedFence fence;
+};
+
+/// Makes every write so far visible to everything after it, on the device.
+void fullBarrier(VkCommandBuffer commands);
+
+/// The device, and one submission that is waited for at once.
 class Device {
  public:
   Device(std::unique_ptr<Instance> instance, const Adapter& chosen, bool staged);
@@ -205,23 +233,21 @@ class Device {
 
   DeviceHandle owner;  // declared first: destroyed last
   const Adapter adapter;
+  unsigned inFlight = 0;  ///< submissions that nobody waits for
 
  private:
   std::uint32_t memoryType(std::uint32_t allowed, Memory where) const;
   OwnedMemory allocate(VkDeviceSize bytes, std::uint32_t type);
   const Buffer& staging();
+  /// Where the host may read and write the buffer at once; null: nowhere. While submissions are in
+  /// flight only a copy, which the queue puts behind them, touches no buffer of theirs.
+  std::byte* inPlace(const Buffer& buffer) const;
 
   bool staged = false;
   VkPhysicalDeviceMemoryProperties memory{};
-  VkQueue queue = VK_NULL_HANDLE;
-  OwnedCommandPool pool;
-  VkCommandBuffer recorded = VK_NULL_HANDLE;
-  OwnedFence fence;
+  Submission work;
   Buffer stagingBuffer;  ///< made on first use
 };
-
-/// Makes every write so far visible to everything after it, on the device.
-void fullBarrier(VkCommandBuffer commands);
 
 // ---- memory.cpp, image.cpp -----------------------------------------------------------------
 
@@ -232,13 +258,38 @@ inline constexpr std::size_t kStagingBytes = 16u << 20;
 /// at more than 1 GB/s. Whoever waits longer waits for a device that is gone.
 inline constexpr std::chrono::seconds kTransferLimit{60};
 
-// ---- program.cpp ---------------------------------------------------------------------------
+VkFormat vulkanFormat(PixelFormat format);
+/// What the device can do with images of the format.
+VkFormatFeatureFlags formatFeatures(const Adapter& adapter, PixelFormat format);
+
+// ---- program.cpp, draw_program.cpp ---------------------------------------------------------
 
 VkDescriptorType descriptorType(const BindingSlot& slot);
+
+/// One stage of a pipeline: a module, its entry point, its constants. What info() says points here.
+class ShaderStage {
+ public:
+  /// Throws UsageError for SPIR-V that is not valid.
+  ShaderStage(Device& device, VkShaderStageFlagBits which, const std::vector<std::uint32_t>& spirv,
+              std::string entryPoint, const std::map<std::uint32_t, std::uint32_t>& constants);
+  ShaderStage(const ShaderStage&) = delete;
+  ShaderStage& operator=(const ShaderStage&) = delete;
+
+  VkPipelineShaderStageCreateInfo info() const;
+
+ private:
+  VkShaderStageFlagBits stage;
+  std::string entry;
+  OwnedShaderModule module;
+  std::vector<VkSpecializationMapEntry> entries;  ///< point into the values
+  std::vector<std::uint32_t> values;
+  VkSpecializationInfo specialization{};
+};
 
 /// What a program is to the device; GpuProgram holds it.
 struct Program {
   std::shared_ptr<Device> device;
+  VkShaderStageFlags stages = 0;  ///< that see its slots and its push constants
   std::vector<BindingSlot> slots;
   unsigned pushBytes = 0;
   std::vector<OwnedSetLayout> sets;  ///< by set number; empty layouts fill gaps
@@ -246,11 +297,22 @@ struct Program {
   OwnedPipeline pipeline;
 };
 
+Program withoutPipeline(std::shared_ptr<Device> device, std::span<const BindingSlot> slots,
+                        unsigned pushBytes, VkShaderStageFlags stages);
 Program makeProgram(std::shared_ptr<Device> device, const ProgramDescription& description);
+
+struct DrawProgram {
+  Program program;
+  std::vector<PixelFormat> colours;
+  bool depth = false;
+  bool readsDrawId = false;  ///< gl_DrawID, which is 0 in each of several calls
+};
+
+DrawProgram makeDrawProgram(std::shared_ptr<Device> device,
+                            const DrawProgramDescription& description);
 
 // ---- run.cpp -------------------------------------------------------------------------------
 
-/// A dispatch with its parts resolved.
 struct BoundRange {
   BindingSlot slot;
   VkDescriptorBufferInfo buffer{};
@@ -261,11 +323,30 @@ struct BoundView {
   std::vector<VkDescriptorImageInfo> images;  ///< as many as the slot has descriptors
 };
 
+/// What a draw has beyond a dispatch: targets, and one of the three ways to say what is drawn.
+struct DrawParts {
+  std::vector<VkRenderingAttachmentInfo> colours;
+  std::optional<VkRenderingAttachmentInfo> depth;
+  VkExtent2D size{};
+  VkBuffer indices = VK_NULL_HANDLE;
+  std::span<const DrawIndexed> direct;
+  VkBuffer commands = VK_NULL_HANDLE;  ///< of an indirect draw
+  VkDeviceSize offset = 0;
+  std::uint32_t count = 0;  ///< the most of them where a buffer holds their number
+  std::uint32_t stride = 0;
+  VkBuffer counter = VK_NULL_HANDLE;  ///< holds their number
+  VkDeviceSize counterOffset = 0;
+  bool oneByOne = false;  ///< without multiDrawIndirect
+};
+
+/// A dispatch or a draw with its parts resolved.
 struct Command {
   const Program* program = nullptr;
   std::vector<BoundRange> buffers;
   std::vector<BoundView> images;
-  const Dispatch* dispatch = nullptr;
+  std::span<const std::byte> push;
+  std::array<std::uint32_t, 3> groups{};  ///< of a dispatch
+  std::optional<DrawParts> draw{};        ///< none: a dispatch
 };
 
 /// What a descriptor pool must hold.
@@ -286,12 +367,16 @@ class Runner {
   /// GPU nanoseconds of each command; 0 without timestamps.
   std::vector<double> run(std::span<const Command> list, std::chrono::milliseconds limit);
 
+  /// The two halves of run(), for who does not wait. What the last list holds must be done.
+  void record(VkCommandBuffer commands, std::span<const Command> list);
+  std::vector<double> readTimes(std::size_t count);
+
  private:
   void reservePool(const DescriptorNeeds& needs);
   void reserveQueries(std::uint32_t count);
   std::vector<VkDescriptorSet> describe(const Command& command);
+  void bind(VkCommandBuffer commands, const Command& command);
   void record(VkCommandBuffer commands, const Command& command, std::uint32_t firstQuery);
-  std::vector<double> readTimes(std::size_t count);
 
   std::shared_ptr<Device> device;
   OwnedDescriptorPool pool;

@@ -1,10 +1,11 @@
 // Buffers, and the way of data to and from them.
 //
 // A device whose own memory the host can map, cached and coherent (software and integrated ones),
-// is written and read in place. Any other gets device-local buffers and copies through one staging
-// buffer. All mapped memory is HOST_COHERENT, which some memory type must be (Vulkan specification,
-// "Device Memory", VkMemoryPropertyFlagBits), so nothing is flushed or invalidated, and
-// nonCoherentAtomSize does not matter.
+// is written and read in place, unless a submission that nobody waited for may still use it. Any
+// other gets device-local buffers and copies through one staging buffer. All mapped memory is
+// HOST_COHERENT, which some memory type must be (Vulkan specification, "Device Memory",
+// VkMemoryPropertyFlagBits), so nothing is flushed or invalidated, and nonCoherentAtomSize does not
+// matter.
 #include "harness/vulkan/internal.h"
 
 #include <algorithm>
@@ -18,8 +19,8 @@ namespace {
 
 constexpr VkBufferUsageFlags kUsage =
     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT |
-    VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-    VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
+    VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 
 constexpr VkMemoryPropertyFlags kMapped =
     VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
@@ -88,6 +89,10 @@ Buffer Device::makeBuffer(std::size_t bytes, Memory where) {
   return buffer;
 }
 
+std::byte* Device::inPlace(const Buffer& buffer) const {
+  return inFlight == 0 ? buffer.mapped : nullptr;
+}
+
 const Buffer& Device::staging() {
   if (stagingBuffer.mapped == nullptr) stagingBuffer = makeBuffer(kStagingBytes, Memory::staging);
   return stagingBuffer;
@@ -95,8 +100,8 @@ const Buffer& Device::staging() {
 
 void Device::upload(const Buffer& to, std::size_t offset, std::span<const std::byte> data) {
   requireAlive();
-  if (to.mapped != nullptr) {
-    std::ranges::copy(data, to.mapped + offset);
+  if (std::byte* const mapped = inPlace(to)) {
+    std::ranges::copy(data, mapped + offset);
     return;
   }
   for (; !data.empty(); data = data.subspan(std::min(data.size(), kStagingBytes))) {
@@ -109,8 +114,8 @@ void Device::upload(const Buffer& to, std::size_t offset, std::span<const std::b
 
 void Device::download(const Buffer& from, std::size_t offset, std::span<std::byte> data) {
   requireAlive();
-  if (from.mapped != nullptr) {
-    std::copy_n(from.mapped + offset, data.size(), data.data());
+  if (const std::byte* const mapped = inPlace(from)) {
+    std::copy_n(mapped + offset, data.size(), data.data());
     return;
   }
   for (; !data.empty(); data = data.subspan(std::min(data.size(), kStagingBytes))) {
@@ -123,9 +128,9 @@ void Device::download(const Buffer& from, std::size_t offset, std::span<std::byt
 
 void Device::fill(const Buffer& buffer, std::uint32_t pattern) {
   requireAlive();
-  if (buffer.mapped != nullptr) {
+  if (std::byte* const mapped = inPlace(buffer)) {
     for (VkDeviceSize i = 0; i < buffer.bytes; i += sizeof pattern)
-      std::memcpy(buffer.mapped + i, &pattern, sizeof pattern);
+      std::memcpy(mapped + i, &pattern, sizeof pattern);
     return;
   }
   const VkCommandBuffer commands = begin();

@@ -1,4 +1,4 @@
-// Compute pipelines: layouts from slots, specialisation, and no unchecked SPIR-V.
+// Programs: layouts from slots, specialisation, and no unchecked SPIR-V.
 #include "harness/vulkan/internal.h"
 
 #include <algorithm>
@@ -11,17 +11,18 @@
 namespace gnomon::vulkan {
 namespace {
 
-void requireLimits(const Adapter& adapter, const ProgramDescription& description) {
-  if (description.pushBytes > adapter.limits.maxPushConstantsSize)
-    throw Unsupported(fmt::format("{} bytes of push constants; {} has {}", description.pushBytes,
-                                  adapter.info.name, adapter.limits.maxPushConstantsSize));
+void requireSubgroups(const Adapter& adapter, unsigned size) {
   const auto& sizes = adapter.info.subgroupSizes;
-  if (description.subgroupSize != 0 &&
-      std::ranges::find(sizes, description.subgroupSize) == sizes.end())
-    throw Unsupported(fmt::format("subgroups of {}; {} cannot make them", description.subgroupSize,
-                                  adapter.info.name));
+  if (size != 0 && std::ranges::find(sizes, size) == sizes.end())
+    throw Unsupported(fmt::format("subgroups of {}; {} cannot make them", size, adapter.info.name));
+}
+
+void requireLimits(const Adapter& adapter, std::span<const BindingSlot> slots, unsigned pushBytes) {
+  if (pushBytes > adapter.limits.maxPushConstantsSize)
+    throw Unsupported(fmt::format("{} bytes of push constants; {} has {}", pushBytes,
+                                  adapter.info.name, adapter.limits.maxPushConstantsSize));
   unsigned storageImages = 0;
-  for (const BindingSlot& slot : description.slots) {
+  for (const BindingSlot& slot : slots) {
     if (slot.set >= adapter.limits.maxBoundDescriptorSets)
       throw Unsupported(fmt::format("descriptor set {}; {} has {} sets", slot.set,
                                     adapter.info.name, adapter.limits.maxBoundDescriptorSets));
@@ -33,12 +34,11 @@ void requireLimits(const Adapter& adapter, const ProgramDescription& description
                                   adapter.limits.maxPerStageDescriptorStorageImages));
 }
 
-OwnedSetLayout makeSetLayout(Device& device, std::span<const BindingSlot> slots, unsigned set) {
+OwnedSetLayout makeSetLayout(Device& device, const Program& program, unsigned set) {
   std::vector<VkDescriptorSetLayoutBinding> bindings;
-  for (const BindingSlot& slot : slots)
+  for (const BindingSlot& slot : program.slots)
     if (slot.set == set)
-      bindings.push_back(
-          {slot.binding, descriptorType(slot), slot.count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+      bindings.push_back({slot.binding, descriptorType(slot), slot.count, program.stages, nullptr});
   VkDescriptorSetLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   info.bindingCount = static_cast<std::uint32_t>(bindings.size());
@@ -49,24 +49,23 @@ OwnedSetLayout makeSetLayout(Device& device, std::span<const BindingSlot> slots,
   return {device.owner, made};
 }
 
-std::vector<OwnedSetLayout> makeSetLayouts(Device& device, std::span<const BindingSlot> slots) {
+std::vector<OwnedSetLayout> makeSetLayouts(Device& device, const Program& program) {
   unsigned count = 0;
-  for (const BindingSlot& slot : slots) count = std::max(count, slot.set + 1);
+  for (const BindingSlot& slot : program.slots) count = std::max(count, slot.set + 1);
   std::vector<OwnedSetLayout> layouts;
-  for (unsigned set = 0; set < count; ++set) layouts.push_back(makeSetLayout(device, slots, set));
+  for (unsigned set = 0; set < count; ++set) layouts.push_back(makeSetLayout(device, program, set));
   return layouts;
 }
 
-OwnedPipelineLayout makeLayout(Device& device, std::span<const OwnedSetLayout> sets,
-                               unsigned pushBytes) {
+OwnedPipelineLayout makeLayout(Device& device, const Program& program) {
   std::vector<VkDescriptorSetLayout> handles;
-  for (const OwnedSetLayout& set : sets) handles.push_back(set.get());
-  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, pushBytes};
+  for (const OwnedSetLayout& set : program.sets) handles.push_back(set.get());
+  const VkPushConstantRange push{program.stages, 0, program.pushBytes};
   VkPipelineLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   info.setLayoutCount = static_cast<std::uint32_t>(handles.size());
   info.pSetLayouts = handles.data();
-  info.pushConstantRangeCount = pushBytes > 0 ? 1 : 0;
+  info.pushConstantRangeCount = program.pushBytes > 0 ? 1 : 0;
   info.pPushConstantRanges = &push;
   VkPipelineLayout made = VK_NULL_HANDLE;
   device.check(vkCreatePipelineLayout(device.owner.handle, &info, nullptr, &made),
@@ -88,37 +87,13 @@ OwnedShaderModule makeModule(Device& device, const std::vector<std::uint32_t>& s
   return {device.owner, made};
 }
 
-/// Specialisation constants in the form that Vulkan takes: entries that point into values.
-struct Specialization {
-  std::vector<VkSpecializationMapEntry> entries;
-  std::vector<std::uint32_t> values;
-
-  explicit Specialization(const std::map<std::uint32_t, std::uint32_t>& constants) {
-    for (const auto& [id, value] : constants) {
-      const auto offset = static_cast<std::uint32_t>(values.size() * sizeof value);
-      entries.push_back({id, offset, sizeof value});
-      values.push_back(value);
-    }
-  }
-
-  VkSpecializationInfo info() const {
-    return {static_cast<std::uint32_t>(entries.size()), entries.data(),
-            values.size() * sizeof(std::uint32_t), values.data()};
-  }
-};
-
 OwnedPipeline makePipeline(Device& device, const ProgramDescription& description,
                            VkPipelineLayout layout) {
-  const OwnedShaderModule module = makeModule(device, description.spirv);
-  const Specialization specialization(description.specialization);
-  const VkSpecializationInfo constants = specialization.info();
+  const ShaderStage stage(device, VK_SHADER_STAGE_COMPUTE_BIT, description.spirv,
+                          description.entryPoint, description.specialization);
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module.get();
-  info.stage.pName = description.entryPoint.c_str();
-  info.stage.pSpecializationInfo = &constants;
+  info.stage = stage.info();
   VkPipelineShaderStageRequiredSubgroupSizeCreateInfo size{};
   size.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO;
   size.requiredSubgroupSize = description.subgroupSize;
@@ -132,6 +107,29 @@ OwnedPipeline makePipeline(Device& device, const ProgramDescription& description
 }
 
 }  // namespace
+
+ShaderStage::ShaderStage(Device& device, VkShaderStageFlagBits which,
+                         const std::vector<std::uint32_t>& spirv, std::string entryPoint,
+                         const std::map<std::uint32_t, std::uint32_t>& constants)
+    : stage(which), entry(std::move(entryPoint)), module(makeModule(device, spirv)) {
+  for (const auto& [id, value] : constants) {
+    const auto offset = static_cast<std::uint32_t>(values.size() * sizeof value);
+    entries.push_back({id, offset, sizeof value});
+    values.push_back(value);
+  }
+  specialization = {static_cast<std::uint32_t>(entries.size()), entries.data(),
+                    values.size() * sizeof values[0], values.data()};
+}
+
+VkPipelineShaderStageCreateInfo ShaderStage::info() const {
+  VkPipelineShaderStageCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage = stage;
+  info.module = module.get();
+  info.pName = entry.c_str();
+  info.pSpecializationInfo = &specialization;
+  return info;
+}
 
 VkDescriptorType descriptorType(const BindingSlot& slot) {
   switch (slot.kind) {
@@ -151,15 +149,24 @@ VkDescriptorType descriptorType(const BindingSlot& slot) {
   return VK_DESCRIPTOR_TYPE_MAX_ENUM;  // no such kind
 }
 
-Program makeProgram(std::shared_ptr<Device> device, const ProgramDescription& description) {
+Program withoutPipeline(std::shared_ptr<Device> device, std::span<const BindingSlot> slots,
+                        unsigned pushBytes, VkShaderStageFlags stages) {
   device->requireAlive();
-  requireLimits(device->adapter, description);
+  requireLimits(device->adapter, slots, pushBytes);
   Program program;
   program.device = device;
-  program.slots = description.slots;
-  program.pushBytes = description.pushBytes;
-  program.sets = makeSetLayouts(*device, description.slots);
-  program.layout = makeLayout(*device, program.sets, description.pushBytes);
+  program.stages = stages;
+  program.slots.assign(slots.begin(), slots.end());
+  program.pushBytes = pushBytes;
+  program.sets = makeSetLayouts(*device, program);
+  program.layout = makeLayout(*device, program);
+  return program;
+}
+
+Program makeProgram(std::shared_ptr<Device> device, const ProgramDescription& description) {
+  requireSubgroups(device->adapter, description.subgroupSize);
+  Program program = withoutPipeline(device, description.slots, description.pushBytes,
+                                    VK_SHADER_STAGE_COMPUTE_BIT);
   program.pipeline = makePipeline(*device, description, program.layout.get());
   return program;
 }

@@ -1,9 +1,51 @@
-// Recording and running dispatches: descriptors, barriers, timestamps.
+// Recording and running dispatches and draws: descriptors, barriers, timestamps.
 #include "harness/vulkan/internal.h"
 
 #include <algorithm>
 
 namespace gnomon::vulkan {
+namespace {
+
+void drawDirect(VkCommandBuffer commands, std::span<const DrawIndexed> draws) {
+  for (const DrawIndexed& draw : draws)
+    vkCmdDrawIndexed(commands, draw.indexCount, draw.instanceCount, draw.firstIndex,
+                     draw.vertexOffset, draw.firstInstance);
+}
+
+void drawIndirect(VkCommandBuffer commands, const DrawParts& draw) {
+  if (draw.counter != VK_NULL_HANDLE)
+    return vkCmdDrawIndexedIndirectCount(commands, draw.commands, draw.offset, draw.counter,
+                                         draw.counterOffset, draw.count, draw.stride);
+  if (!draw.oneByOne)
+    return vkCmdDrawIndexedIndirect(commands, draw.commands, draw.offset, draw.count, draw.stride);
+  for (std::uint32_t i = 0; i < draw.count; ++i)
+    vkCmdDrawIndexedIndirect(commands, draw.commands, draw.offset + VkDeviceSize{i} * draw.stride,
+                             1, draw.stride);
+}
+
+void render(VkCommandBuffer commands, const DrawParts& draw) {
+  const VkRect2D area{{0, 0}, draw.size};
+  const VkViewport viewport{
+      0, 0, static_cast<float>(draw.size.width), static_cast<float>(draw.size.height), 0, 1};
+  VkRenderingInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_RENDERING_INFO;
+  info.renderArea = area;
+  info.layerCount = 1;
+  info.colorAttachmentCount = static_cast<std::uint32_t>(draw.colours.size());
+  info.pColorAttachments = draw.colours.data();
+  info.pDepthAttachment = draw.depth ? &*draw.depth : nullptr;
+  vkCmdBeginRendering(commands, &info);
+  vkCmdSetViewport(commands, 0, 1, &viewport);
+  vkCmdSetScissor(commands, 0, 1, &area);
+  vkCmdBindIndexBuffer(commands, draw.indices, 0, VK_INDEX_TYPE_UINT32);
+  if (draw.commands == VK_NULL_HANDLE)
+    drawDirect(commands, draw.direct);
+  else
+    drawIndirect(commands, draw);
+  vkCmdEndRendering(commands);
+}
+
+}  // namespace
 
 void DescriptorNeeds::add(const Program& program) {
   sets += static_cast<std::uint32_t>(program.sets.size());
@@ -89,32 +131,40 @@ std::vector<VkDescriptorSet> Runner::describe(const Command& command) {
   return sets;
 }
 
-void Runner::record(VkCommandBuffer commands, const Command& command, std::uint32_t firstQuery) {
+void Runner::bind(VkCommandBuffer commands, const Command& command) {
   const Program& program = *command.program;
-  const Dispatch& dispatch = *command.dispatch;
+  const VkPipelineBindPoint point =
+      command.draw ? VK_PIPELINE_BIND_POINT_GRAPHICS : VK_PIPELINE_BIND_POINT_COMPUTE;
   const std::vector<VkDescriptorSet> sets = describe(command);
+  vkCmdBindPipeline(commands, point, program.pipeline.get());
+  if (!sets.empty())
+    vkCmdBindDescriptorSets(commands, point, program.layout.get(), 0,
+                            static_cast<std::uint32_t>(sets.size()), sets.data(), 0, nullptr);
+  if (!command.push.empty())
+    vkCmdPushConstants(commands, program.layout.get(), program.stages, 0,
+                       static_cast<std::uint32_t>(command.push.size()), command.push.data());
+}
+
+void Runner::record(VkCommandBuffer commands, const Command& command, std::uint32_t firstQuery) {
   // Both stamps at the bottom of the pipe: the first waits until all work before it is done, so
-  // that the difference is this dispatch's time alone.
+  // that the difference is this command's time alone.
   const auto stamp = [&](std::uint32_t query) {
     if (queryCapacity > 0)
       vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries.get(), query);
   };
-  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, program.pipeline.get());
-  if (!sets.empty())
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, program.layout.get(), 0,
-                            static_cast<std::uint32_t>(sets.size()), sets.data(), 0, nullptr);
-  if (!dispatch.push.empty())
-    vkCmdPushConstants(commands, program.layout.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                       static_cast<std::uint32_t>(dispatch.push.size()), dispatch.push.data());
+  bind(commands, command);
   stamp(firstQuery);
-  vkCmdDispatch(commands, dispatch.groups[0], dispatch.groups[1], dispatch.groups[2]);
+  if (command.draw)
+    render(commands, *command.draw);
+  else
+    vkCmdDispatch(commands, command.groups[0], command.groups[1], command.groups[2]);
   stamp(firstQuery + 1);
   fullBarrier(commands);
 }
 
 std::vector<double> Runner::readTimes(std::size_t count) {
   std::vector<double> times(count, 0);
-  if (queryCapacity == 0) return times;
+  if (queryCapacity == 0 || count == 0) return times;
   std::vector<std::uint64_t> stamps(count * 2);
   device->check(vkGetQueryPoolResults(device->owner.handle, queries.get(), 0,
                                       static_cast<std::uint32_t>(stamps.size()),
@@ -130,15 +180,19 @@ std::vector<double> Runner::readTimes(std::size_t count) {
   return times;
 }
 
-std::vector<double> Runner::run(std::span<const Command> list, std::chrono::milliseconds limit) {
+void Runner::record(VkCommandBuffer commands, std::span<const Command> list) {
   const auto queryCount = static_cast<std::uint32_t>(list.size() * 2);
-  const VkCommandBuffer commands = device->begin();
   DescriptorNeeds needs;
   for (const Command& command : list) needs.add(*command.program);
   reservePool(needs);
   reserveQueries(queryCount);
-  if (queryCapacity > 0) vkCmdResetQueryPool(commands, queries.get(), 0, queryCount);
+  if (queryCapacity > 0 && queryCount > 0)
+    vkCmdResetQueryPool(commands, queries.get(), 0, queryCount);
   for (std::uint32_t i = 0; i < list.size(); ++i) record(commands, list[i], 2 * i);
+}
+
+std::vector<double> Runner::run(std::span<const Command> list, std::chrono::milliseconds limit) {
+  record(device->begin(), list);
   device->finish(limit);
   return readTimes(list.size());
 }

@@ -28,12 +28,12 @@ Coordinate pixelAt(double x) {
 Coordinate pixelAt(const Altered& x) { return pixelAt(x.value); }
 
 /// First and last pixel along one axis.
-struct Range {
+struct PixelRange {
   Coordinate first, last;
 };
 
 template <class T>
-Range rangeOf(const Slopes<T>& clip, uint size) {
+PixelRange rangeOf(const Slopes<T>& clip, uint size) {
   const auto pixel = [&](const T& at) {
     const T scaled = (at * T(0.5f) + T(0.5f)) * input<T>(static_cast<float>(size));
     return pixelAt(clamp(scaled, T(0), input<T>(static_cast<float>(size - 1))));
@@ -90,7 +90,7 @@ T depthAt(const T& distance, const Camera& camera) {
 
 enum class Form { kValue, kLargest, kSmallest };
 
-PixelRect rectOf(const Range& x, const Range& y, Form form) {
+PixelRect rectOf(const PixelRange& x, const PixelRange& y, Form form) {
   const auto first = [&](const Coordinate& c) {
     return form == Form::kValue ? c.value : form == Form::kLargest ? c.least : c.most;
   };
@@ -101,7 +101,7 @@ PixelRect rectOf(const Range& x, const Range& y, Form form) {
 }
 
 template <class T>
-T notHidden(const T& z, const Range& x, const Range& y, const Pyramid& pyramid) {
+T notHidden(const T& z, const PixelRange& x, const PixelRange& y, const Pyramid& pyramid) {
   const auto nearerThan = [&](Form form) {
     const PixelRect rect = rectOf(x, y, form);
     if (rect.x0 > rect.x1 || rect.y0 > rect.y1) return T(0);  // nobody knows which pixel
@@ -164,9 +164,9 @@ T unoccluded(const Camera& camera, const Bounds& sphere, const Occlusion& push,
   const bool perspective = isPerspective(camera);
   const auto steep = max(abs(s.x), abs(s.y)) > input<T>(kSteepest) * s.d;
   if (perspective && certainly(steep)) return T(1);
-  const Range x =
+  const PixelRange x =
       rangeOf(covered(s.x, s, axisOf<T>(camera.projection, 0), perspective), push.size.x);
-  const Range y =
+  const PixelRange y =
       rangeOf(covered(s.y, s, axisOf<T>(camera.projection, 1), perspective), push.size.y);
   const T shown = notHidden(depthAt(s.nearest, camera), x, y, pyramid);
   const auto kept = perspective ? crosses || steep : crosses;

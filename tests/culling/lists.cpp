@@ -52,6 +52,7 @@ struct Counts {
 struct Totals {
   std::size_t candidates = 0;
   uint capacity = 0, patience = 0;
+  uint recounted = 0;  ///< as the kernel says: timing's, where it had patience
 
   /// Blocks that are counted again where nobody is asked: all before each.
   uint allBlocks() const {
@@ -60,13 +61,9 @@ struct Totals {
   }
 };
 
-/// Blocks that are counted again: all of them without patience, with it as many as time has it.
-template <class T>
-T recountedOf(const Totals& totals) {
-  const T all = T(totals.allBlocks());
-  if constexpr (std::is_same_v<T, Bounded>)
-    return totals.patience == 0 ? all : Bounded::between(0, totals.allBlocks());
-  return totals.patience == 0 ? all : T(0);
+/// Blocks that are counted again: all of them without patience, at most all with it.
+uint recountedOf(const Totals& totals) {
+  return totals.patience == 0 ? totals.allBlocks() : std::min(totals.recounted, totals.allBlocks());
 }
 
 /// `member` says of one candidate whether it is visible, 1 or 0; of bounds both.
@@ -77,7 +74,7 @@ Counts<T> countsOf(const Totals& totals, const Member& member) {
     total = total + member.template operator()<T>(i);
   const T most = T(totals.capacity);
   return {T(static_cast<uint>(totals.candidates)), total, min(total, most),
-          select(total > most, T(1), T(0)), recountedOf<T>(totals)};
+          select(total > most, T(1), T(0)), T(recountedOf(totals))};
 }
 
 template <class Member>
@@ -85,6 +82,10 @@ Expectation tallyOf(const Totals& totals, Member member) {
   return expectationOf(
       "tally", 1, [=]<class T>(std::size_t) { return countsOf<T>(totals, member); },
       [=](std::size_t) { return fmt::format("    {} candidates\n", totals.candidates); });
+}
+
+uint recountedBy(const Observation& seen) {
+  return seen.applies ? elementsOf<Tally>(seen.twin.at("tally"))[0].recounted : 0;
 }
 
 /// The levels from the first on, as an image has them; one texel where there are none.
@@ -218,7 +219,8 @@ Trial ListCase::judged(OcclusionInput& input) {
 
 void ListCase::expectRightTally(FrustumInput input) {
   const Observation seen = judged(input).seen;
-  const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience};
+  const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience,
+                      recountedBy(seen)};
   expectConforms(
       seen, tallyOf(totals, [&input]<class T>(std::size_t i) { return membership<T>(input, i); }));
 }
@@ -228,7 +230,8 @@ void ListCase::expectRightTally(OcclusionInput input) {
   const OcclusionStimulus given(input);
   const auto model =
       std::make_shared<const OcclusionModel>(OcclusionModel{input, given.pyramid, given.survivors});
-  const Totals totals{model->survivors.size(), input.push.capacity, input.push.patience};
+  const Totals totals{model->survivors.size(), input.push.capacity, input.push.patience,
+                      recountedBy(seen)};
   expectConforms(
       seen, tallyOf(totals, [model]<class T>(std::size_t i) { return model->membership<T>(i); }));
 }

@@ -13,6 +13,7 @@
 #include "harness/cases/kernel_case.h"
 #include "harness/cases/random.h"
 #include "kernels/culling/camera.h"
+#include "reference/culling/hiz.h"
 
 namespace gnomon::culling {
 namespace {
@@ -284,16 +285,16 @@ std::vector<DrawCommand> commandsFor(std::size_t objects) {
 }
 
 Pyramid pyramidOf(const Picture& depth) {
+  DepthBuffer buffer{depth.size, {}};
+  for (const vec4& texel : depth.texels) buffer.depths.push_back(texel.x);
   Pyramid pyramid{.size = depth.size};
-  const auto [width, height] = std::array{depth.size.x, depth.size.y};
-  for (uint level = 0; level == 0 || std::max(width, height) >> level > 0; ++level) {
-    const uint w = std::max(width >> level, 1u), h = std::max(height >> level, 1u);
-    std::vector<float>& texels = pyramid.levels.emplace_back(std::size_t{w} * h, 1.0f);
-    for (uint y = 0; y < height; ++y)
-      for (uint x = 0; x < width; ++x) {
-        float& texel = texels[std::min(y >> level, h - 1) * w + std::min(x >> level, w - 1)];
-        texel = std::min(texel, depth.at(std::size_t{y} * width + x).x);
-      }
+  for (uint level = 0; level <= levelCount(depth.size); ++level) {
+    const uvec2 size = levelSize(depth.size, level);
+    std::vector<float>& texels = pyramid.levels.emplace_back();
+    for (uint y = 0; y < size.y; ++y)
+      for (uint x = 0; x < size.x; ++x)
+        texels.push_back(
+            static_cast<float>(farthest<double>(buffer, footprint(depth.size, level, {x, y}))));
   }
   return pyramid;
 }

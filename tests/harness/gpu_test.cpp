@@ -200,7 +200,9 @@ TEST_P(GpuTest, PoolsGrowWithTheRunAndAreReused) {
   EXPECT_EQ(downloaded(*gpu, counters), Words(64, 144));
 }
 
-TEST_P(GpuTest, ARunOfNothingTakesNoTime) { EXPECT_EQ(gpu->run({}, kLimit).size(), 0u); }
+TEST_P(GpuTest, ARunOfNothingTakesNoTime) {
+  EXPECT_EQ(gpu->run(std::span<const Dispatch>(), kLimit).size(), 0u);
+}
 
 TEST_P(GpuTest, PushAndSpecializationConstantsReachTheKernel) {
   ProgramDescription description = describe(R"(
@@ -355,6 +357,21 @@ TEST_P(GpuTest, ValidationNamesTheRuleThatABindingBreaksAndPrintsNothing) {
   EXPECT_EQ(messages[0].rfind("VUID-VkDescriptorBufferInfo-range-00342: ", 0), 0u) << messages[0];
   EXPECT_EQ(messages[0].find("Object 0"), std::string::npos) << messages[0];  // no handles
   EXPECT_EQ(gpu->takeMessages().size(), 0u);
+}
+
+// So that validation reports who uses it all the same.
+TEST_P(GpuTest, AFeatureThatShallNotBeUsedIsNotEnabled) {
+  if (!gpu->info().features.at("shaderFloat64")) GTEST_SKIP() << "no doubles on this device";
+  Gpu single(Gpu::Options{.device = "", .staged = GetParam(), .without = {"shaderFloat64"}});
+  EXPECT_FALSE(single.info().features.at("shaderFloat64"));
+  single.build(describe(R"(
+    layout(local_size_x = 1) in;
+    layout(set = 0, binding = 0) buffer State { double state; };
+    void main() { state *= 2; })",
+                        {kFirst}));
+  const std::vector<std::string> messages = single.takeMessages();
+  ASSERT_FALSE(messages.empty());
+  EXPECT_TRUE(contains(messages[0], "Float64"));
 }
 
 TEST_P(GpuTest, ProgramsAndBuffersMayOutliveTheirGpu) {
