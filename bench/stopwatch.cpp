@@ -12,7 +12,7 @@ Stopwatch* running = nullptr;
 
 constexpr std::size_t kMiB = 1u << 20;
 constexpr std::size_t kGroupBytes = 16 * 1024;  // of copy.comp
-constexpr int kCopies = 9, kEmpties = 31;       // odd: a median is one of them
+constexpr int kCopies = 9, kEmpties = 31;
 
 // Five times the largest cache of a GPU so far (50 MiB of L2).
 constexpr std::size_t kCopied = 256 * kMiB, kSwept = 256 * kMiB;
@@ -22,6 +22,12 @@ constexpr std::size_t kCopied = 256 * kMiB, kSwept = 256 * kMiB;
 constexpr std::size_t kCopiedInSoftware = 64 * kMiB, kSweptInSoftware = 8 * kMiB;
 
 }  // namespace
+
+double leastOf(int runs, const std::function<double()>& run) {
+  double least = run();
+  for (int i = 1; i < runs; ++i) least = std::min(least, run());
+  return least;
+}
 
 Stopwatch::Stopwatch(Session& s) : session(s) {
   if (running != nullptr) throw std::logic_error("there is a stopwatch already");
@@ -41,8 +47,8 @@ Stopwatch::Stopwatch(Session& s) : session(s) {
   sweep = {copyOf(software ? kSweptInSoftware : kSwept)};
   running = this;
   if (gpu.info().timestampPeriodNs == 0) return;
-  copied = 2 * static_cast<double>(bytes) / median(copyOf(bytes), kCopies);
-  empty = median({.program = &nothing}, kEmpties);
+  copied = 2 * static_cast<double>(bytes) / seconds(copyOf(bytes), kCopies);
+  empty = seconds({.program = &nothing}, kEmpties);
 }
 
 Stopwatch::~Stopwatch() { running = nullptr; }
@@ -63,14 +69,10 @@ Dispatch Stopwatch::copyOf(std::size_t bytes) const {
           .groups = {static_cast<std::uint32_t>(bytes / kGroupBytes), 1, 1}};
 }
 
-double Stopwatch::median(const Dispatch& dispatch, int runs) const {
+double Stopwatch::seconds(const Dispatch& dispatch, int runs) const {
   Gpu& gpu = session.gpu();
   gpu.run({&dispatch, 1}, session.limit());  // pays for what the driver does once
-  std::vector<double> seconds;
-  for (int i = 0; i < runs; ++i)
-    seconds.push_back(gpu.run({&dispatch, 1}, session.limit()).front() * 1e-9);
-  std::ranges::nth_element(seconds, seconds.begin() + runs / 2);
-  return seconds[static_cast<std::size_t>(runs / 2)];
+  return leastOf(runs, [&] { return gpu.run({&dispatch, 1}, session.limit()).front() * 1e-9; });
 }
 
 }  // namespace gnomon

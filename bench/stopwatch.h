@@ -2,12 +2,17 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
+#include <functional>
+#include <vector>
 
 #include "harness/cases/session.h"
 #include "harness/hygiene/resources.h"
 
 namespace gnomon {
+
+/// The least of several times. What disturbs a run only ever adds to its time, so the least is
+/// nearest to the work itself (Chen and Revels 2016, "Robust benchmarking in noisy environments").
+double leastOf(int runs, const std::function<double()>& run);
 
 /// One lives while benchmarks run.
 class Stopwatch {
@@ -34,7 +39,7 @@ class Stopwatch {
 
  private:
   Dispatch copyOf(std::size_t bytes) const;
-  double median(const Dispatch& dispatch, int runs) const;
+  double seconds(const Dispatch& dispatch, int runs) const;
 
   Session& session;
   GpuBuffer from, to;

@@ -1,7 +1,5 @@
 #include "bench/timing.h"
 
-#include <algorithm>
-#include <array>
 #include <chrono>
 
 #include "bench/stopwatch.h"
@@ -10,16 +8,9 @@
 namespace gnomon {
 namespace {
 
+// Google Benchmark would run what is quick thousands of times, each with its sweep of the caches:
+// as many runs for everything instead, in one iteration.
 constexpr int kRuns = 9;
-
-/// Google Benchmark would run what is quick thousands of times, each with its sweep of the caches:
-/// as many runs for everything instead, in one iteration.
-double medianOf(const std::function<double()>& run) {
-  std::array<double, kRuns> seconds;
-  for (double& s : seconds) s = run();
-  std::ranges::nth_element(seconds, seconds.begin() + kRuns / 2);
-  return seconds[kRuns / 2];
-}
 
 Written named(const Resources& resources, Aftermath after) {
   Written written;
@@ -56,7 +47,7 @@ Written timeKernel(benchmark::State& state, const std::string& kernel, const Sti
     Written written = named(resources, resources.run(subject.plain(), 0));
     for (auto _ : state)
       state.SetIterationTime(
-          medianOf([&] { return Stopwatch::current().cold(resources, subject.plain()); }));
+          leastOf(kRuns, [&] { return Stopwatch::current().cold(resources, subject.plain()); }));
     setRates(state, stimulus.extent.count(), bytes.value_or(resources.bytes()));
     state.SetLabel(subject.gpu().info().name);
     return written;
@@ -74,7 +65,7 @@ void timeCpu(benchmark::State& state, std::size_t items, const std::function<voi
     work();
     return std::chrono::duration<double>(Clock::now() - begin).count();
   };
-  for (auto _ : state) state.SetIterationTime(medianOf(run));
+  for (auto _ : state) state.SetIterationTime(leastOf(kRuns, run));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(items));
   state.SetLabel("one core of the CPU");
 }

@@ -79,7 +79,7 @@ class Drawing {
     }
     const double middle = kTop + kPanelHeight / 2;
     write(16, middle, plot.yLabel,
-          fmt::format(R"(text-anchor="middle" transform="rotate(-90 16 {})")", middle));
+          fmt::format("text-anchor=\"middle\" transform=\"rotate(-90 16 {})\"", middle));
     for (std::size_t i = 0; i < names.size(); ++i)
       drawKey(names[i], kLeft + kLegendColumn * static_cast<double>(i % columns),
               legendTop + kLegendRow * static_cast<double>(i / columns));
