@@ -33,6 +33,11 @@ void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
   }
 }
 
+void KernelCase::widthDoesNotMatter() {
+  CaseRecord& found = Session::current().currentCase();
+  found.threadsCommunicate = found.usesSubgroups = false;
+}
+
 void KernelCase::skipUnlessEveryOutputIsGiven() {
   if (IsSkipped()) return;
   const Interface& interface = Session::current().subject(kernelName).interface();
