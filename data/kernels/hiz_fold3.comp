@@ -4,10 +4,11 @@
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(binding = 0) uniform texture2D parent;
 layout(binding = 1, r32f) writeonly uniform image2D level;
+layout(push_constant) uniform Push { uvec2 parentSize; };
 
 void main() {
-  const ivec2 at = ivec2(gl_GlobalInvocationID.xy), size = textureSize(parent, 0);
-  if (any(greaterThanEqual(at, imageSize(level)))) return;
+  const ivec2 at = ivec2(gl_GlobalInvocationID.xy), size = ivec2(parentSize);
+  if (any(greaterThanEqual(at, max(size / 2, ivec2(1))))) return;
   const ivec2 taps = 2 + (size & 1);
   float farthest = 3.402823466e38;
   for (int y = 0; y < taps.y; ++y)
