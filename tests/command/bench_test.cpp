@@ -52,7 +52,8 @@ TEST_F(BenchObjects, WritesAWellFormedPlotOfBothWorlds) {
   ASSERT_EQ(said.status, 0) << said.output;
   const std::string svg = textOf(file("o.svg"));
   EXPECT_EQ(xmlFault(svg), "");
-  for (const char* word : {">city<", ">field<", ">frustum<", ">occlusion<", ">cpu_bvh<", ">1,000<"})
+  for (const char* word :
+       {">city<", ">field<", ">frustum<", ">hiz<", ">occlusion<", ">cpu_bvh<", ">1k<"})
     EXPECT_NE(svg.find(word), std::string::npos) << word;
 }
 
@@ -65,14 +66,14 @@ TEST_F(BenchObjects, WritesGoogleBenchmarksJsonWithItsCounters) {
   for (const auto& b : json["benchmarks"]) {
     const std::string name = b["run_name"];
     names.insert(name.substr(0, name.rfind('/')));
+    const bool draws = name.find("/hiz/") == name.npos, moves = name.find("/cpu_") == name.npos;
     for (const char* key : {"survivors", "culled", "draws_before", "draws_after"})
-      EXPECT_TRUE(b.contains(key)) << name << ": " << key;
-    if (name.find("cpu_") != name.npos) continue;
+      EXPECT_EQ(b.contains(key), draws) << name << ": " << key;
     for (const char* key : {"bytes_per_second", "share_of_copy"})
-      EXPECT_TRUE(b.contains(key)) << name << ": " << key;
+      EXPECT_EQ(b.contains(key), moves) << name << ": " << key;
   }
   for (const char* world : {"city", "field"})
-    for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "occlusion"})
+    for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "hiz", "occlusion"})
       for (const char* objects : {"100", "316", "1000"})
         EXPECT_TRUE(names.contains(std::string("objects/") + world + "/" + entry + "/" + objects))
             << world << entry << objects;
@@ -100,7 +101,7 @@ TEST_F(BenchObjects, EndsWithATableAndTheLawOfEveryEntry) {
   const std::size_t head = said.output.find("t = c + a n^b");
   ASSERT_NE(head, std::string::npos) << said.output;
   const std::string table = said.output.substr(head);
-  for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "occlusion"})
+  for (const char* entry : {"cpu_none", "cpu_frustum", "cpu_bvh", "frustum", "hiz", "occlusion"})
     EXPECT_NE(table.find(entry), std::string::npos) << entry;
 }
 
