@@ -74,7 +74,7 @@ void countDraws(benchmark::State& state, std::size_t before, std::size_t after) 
 void timeFrustum(benchmark::State& state, const std::string& kernel, const Case& c) {
   const auto n = static_cast<uint>(c.objects);
   const Frustum push{
-      .count = n, .capacity = n, .noNearPlane = 0, .pad = c.world.pad, .patience = kForever};
+      .count = n, .capacity = n, .noNearPlane = 0, .pad = c.world.pad, .patience = kPatience};
   // Every sphere, and the draw of each survivor from one list to the other.
   const std::size_t bytes =
       sizeof(Camera) + c.objects * sizeof(Bounds) + 2 * c.survivors.size() * sizeof(DrawCommand);
@@ -113,7 +113,7 @@ void timeOcclusion(benchmark::State& state, const std::string& kernel, const Cas
                        .candidates = n,
                        .capacity = n,
                        .pad = c.world.pad,
-                       .patience = kForever};
+                       .patience = kPatience};
   const Tally found{
       .tested = push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0};
   // The draw and the sphere of every candidate; texels, and what is written, are not known before.

@@ -9,6 +9,7 @@
 #include "harness/cases/case_file.h"
 #include "harness/cases/hash.h"
 #include "harness/cases/probes.h"
+#include "harness/cases/runner.h"
 #include "harness/error.h"
 #include "harness/hygiene/pack.h"
 
@@ -30,6 +31,11 @@ void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
     Session::current().currentCase().unsupported = why.what();
     GTEST_SKIP() << why.what();
   }
+}
+
+void KernelCase::widthDoesNotMatter() {
+  CaseRecord& found = Session::current().currentCase();
+  found.threadsCommunicate = found.usesSubgroups = false;
 }
 
 void KernelCase::skipUnlessEveryOutputIsGiven() {
@@ -145,6 +151,9 @@ void KernelCase::expectWithin(const Standard& by, const Policy& policy, const Ob
                               const Expectation& expected, const Explain& explained) {
   if (!seen.applies) return;
   Session& session = Session::current();
+  const CaseRecord& running = session.currentCase();
+  if (kindOf({running.name, running.kernel}) == Kind::kLaw)
+    throw std::logic_error(running.name + " judges by the model, so it is no law");
   const Subject& subject = session.subject(kernelName);
   const Struct layout = subject.record().layoutOf(expected.output);
   for (const Expectation& e : judgedBy(subject.record(), expected)) {

@@ -40,6 +40,10 @@ class KernelCase : public testing::Test {
   /// arrangement is as good as ours, and its intermediates are where it has them.
   void skipUnlessTheProbesAreOurs();
 
+  /// Leaves a case out of the sweep over subgroup widths: what threads tell each other, other cases
+  /// of the kernel are about.
+  void widthDoesNotMatter();
+
   /// Whether the kernel takes these push constants: a foreign one may stand for one value of some,
   /// as its adapter's constants say. A case goes on to the next where it does not.
   bool applies(std::span<const std::byte> push);

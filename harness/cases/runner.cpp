@@ -3,6 +3,7 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <array>
 #include <set>
 
 #include <fmt/format.h>
@@ -123,6 +124,16 @@ class Listener : public testing::EmptyTestEventListener {
   std::size_t started = 0;
 };
 
+struct KindName {
+  Kind kind;
+  std::string_view name, suite;
+};
+constexpr std::array<KindName, 5> kKinds = {{{Kind::kComparison, "comparison", ""},
+                                             {Kind::kLaw, "law", "Laws"},
+                                             {Kind::kTruth, "truth", "Model"},
+                                             {Kind::kComposition, "composition", "Parts"},
+                                             {Kind::kBound, "bound", "Bound"}}};
+
 }  // namespace
 
 std::vector<CaseName> selectCases(const Selection& selection) {
@@ -141,9 +152,20 @@ std::vector<CaseName> selectCases(const Selection& selection) {
   return chosen;
 }
 
-bool judgesModel(const CaseName& c) {
-  return std::string_view(c.name).substr(0, c.name.find('.')).ends_with("Model");
+Kind kindOf(const CaseName& c) {
+  const std::string_view suite = std::string_view(c.name).substr(0, c.name.find('.'));
+  const auto named = std::ranges::find_if(
+      kKinds, [&](const KindName& k) { return !k.suite.empty() && suite.ends_with(k.suite); });
+  return named == kKinds.end() ? Kind::kComparison : named->kind;
 }
+
+std::string_view nameOf(Kind kind) {
+  return std::ranges::find(kKinds, kind, &KindName::kind)->name;
+}
+
+bool runsKernel(Kind kind) { return kind == Kind::kComparison || kind == Kind::kLaw; }
+
+bool judgesModel(Kind kind) { return kind == Kind::kTruth || kind == Kind::kComposition; }
 
 void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer) {
   delete Listener::listeners().Release(Listener::listeners().default_result_printer());

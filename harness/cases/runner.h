@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/cases/session.h"
@@ -32,8 +33,19 @@ struct Observer {
   bool endsCaseAtFailure = false;  ///< the first failure of a case is all that is asked of it
 };
 
-/// Whether a case judges a model against truth, and runs no kernel: its suite is called ...Model.
-bool judgesModel(const CaseName& c);
+/// What a case judges, and by what: the end of its suite's name says it.
+enum class Kind {
+  kComparison,   ///< a kernel by its model
+  kLaw,          ///< ...Laws: a kernel by what holds without its model
+  kTruth,        ///< ...Model: a model by what does not come from it; no kernel runs
+  kComposition,  ///< ...Parts: a whole model by its own parts; no kernel runs
+  kBound         ///< ...Bound: how wide a model's intervals are; no kernel runs
+};
+Kind kindOf(const CaseName& c);
+std::string_view nameOf(Kind kind);  ///< "comparison", "law", ...
+bool runsKernel(Kind kind);
+/// Whether it can tell an altered model: an interval is no number that could be altered.
+bool judgesModel(Kind kind);
 
 /// Runs the cases in this process, kernel by kernel; the session holds the records afterwards.
 void runCases(Session& session, const std::vector<CaseName>& cases, const Observer& observer);

@@ -31,11 +31,15 @@ struct ListOptions {
   std::string what;    ///< stages, kernels or cases
   bool kills = false;  ///< of cases: which mutants each kills
   std::vector<std::string> stages;
-  SessionOptions session;          ///< where --kills has to find out
-  std::optional<unsigned> jobs{};  ///< the same
+  std::vector<std::string> kinds{};    ///< of cases, by name; none: all
+  std::vector<std::string> mutants{};  ///< that --kills asks about, by id; none: all
+  SessionOptions session;              ///< where --kills has to find out
+  std::optional<unsigned> jobs{};      ///< the same
   std::string json;
 };
 int list(const ListOptions& options);
+/// The cases that it is about.
+std::vector<CaseName> casesOf(const ListOptions& options);
 /// The part of it that runs kernels.
 int listKills(const ListOptions& options);
 

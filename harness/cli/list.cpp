@@ -43,21 +43,32 @@ void printColumns(const std::vector<Line>& lines) {
 
 }  // namespace
 
+std::vector<CaseName> casesOf(const ListOptions& options) {
+  std::vector<CaseName> cases = selectCases({.stages = options.stages, .filter = {}});
+  if (!options.kinds.empty())
+    std::erase_if(cases, [&](const CaseName& c) {
+      return std::ranges::find(options.kinds, nameOf(kindOf(c))) == options.kinds.end();
+    });
+  return cases;
+}
+
 int list(const ListOptions& options) {
   if (options.kills && options.what != "cases")
     throw UsageError("--kills is of cases: gnomon list cases --kills");
   if (options.kills) return listKills(options);
-  const std::vector<CaseName> cases = selectCases({.stages = options.stages, .filter = {}});
+  const std::vector<CaseName> cases = casesOf(options);
   std::vector<Line> lines;
   if (options.what == "stages") lines = listStages(cases);
   if (options.what == "kernels") lines = listKernels(cases);
   if (options.what == "cases")
-    for (const CaseName& c : cases) lines.push_back({c.name, ""});
+    for (const CaseName& c : cases) lines.push_back({c.name, std::string(nameOf(kindOf(c)))});
   if (options.json != "-") printColumns(lines);
   if (!options.json.empty()) {
-    auto array = nlohmann::json::array();
-    for (const Line& l : lines) array.push_back(l.name);
-    writeText(options.json, nlohmann::json{{"schema", 1}, {options.what, array}}.dump(1) + "\n");
+    nlohmann::json json = {{"schema", 1}, {options.what, nlohmann::json::array()}};
+    for (const Line& l : lines) json[options.what].push_back(l.name);
+    if (options.what == "cases")
+      for (const CaseName& c : cases) json["kind"][c.name] = nameOf(kindOf(c));
+    writeText(options.json, json.dump(1) + "\n");
   }
   return kGood;
 }

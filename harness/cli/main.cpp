@@ -100,10 +100,21 @@ void addList(CLI::App& app, Action& action) {
       ->required()
       ->check(CLI::IsMember({"stages", "kernels", "cases"}));
   command->add_option("stages", options->stages, "STAGE or STAGE/ENTRY (default: all)");
-  CLI::Option* kills = command->add_flag(
-      "--kills", options->kills,
-      "Of cases: how many mutants each kills, and which no other does; what `mutate` has not found "
-      "out yet is run. The flags below are for that");
+  command->add_option("--kind", options->kinds, "Only cases of these kinds, with commas between")
+      ->check(CLI::IsMember({"comparison", "law", "truth", "composition", "bound"}))
+      ->delimiter(',')
+      ->type_name("LIST");
+  CLI::Option* kills =
+      command->add_flag("--kills", options->kills,
+                        "Of cases: how many mutants each kills, and how many no other of its kind "
+                        "does; what an earlier run has not found out is run. The flags below are "
+                        "for that");
+  command
+      ->add_option("--mutants", options->mutants,
+                   "Only these mutants, by the ids that `mutate` prints, with commas between")
+      ->delimiter(',')
+      ->type_name("LIST")
+      ->needs(kills);
   command->add_option("--jobs", options->jobs, kJobs)
       ->check(CLI::PositiveNumber)
       ->type_name("N")
@@ -136,6 +147,9 @@ void addValidate(CLI::App& app, Action& action) {
                    "Judge one input again: a file that a failure was shrunk to (DIR/failures of "
                    "--out, else in the user's cache), as its `reproduce:` line says")
       ->type_name("FILE");
+  command->add_flag_callback(
+      "--no-shrink", [o] { o->session.shrinks = false; },
+      "Show a failing input as it was generated, and write none: saves seconds for each failure");
   command->add_option("--junit", o->junit, "Write JUnit XML to FILE")->type_name("FILE");
   addShard(*command, o->selection);
   command->add_option("--jobs", o->jobs, kJobs)->check(CLI::PositiveNumber)->type_name("N");

@@ -140,6 +140,7 @@ std::string fingerprint(const ValidateOptions& o, const Preparation& prepared) {
                         {"seed", s.seed},
                         {"cases", s.cases.value_or(0)},
                         {"timeout", s.timeout ? s.timeout->count() : 0},
+                        {"shrinks", s.shrinks},
                         {"replay", hashOf(contentOf(s.replay))},
                         {"prepared", toJson(prepared)},
                         {"policy", hashOf(contentOf(s.root / "tests/policy.json"))},

@@ -14,7 +14,7 @@ namespace gnomon {
 /// What a worker is to run.
 struct WorkerTask {
   SessionOptions session{};
-  std::vector<std::string> cases{};      ///< by name, in this order; none: to prepare only
+  std::vector<std::string> cases{};      ///< by name, in this order; none: to prepare only, or list
   std::optional<DeviceErrors> errors{};  ///< of the device; none: as a file says
   std::string mutated{};               ///< the kernel whose mutants the cases are to tell; or none
   std::vector<std::string> mutants{};  ///< by id (harness/mutate/mutants.h): one after another

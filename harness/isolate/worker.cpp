@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <new>
-#include <utility>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -104,22 +103,27 @@ void end(const Session& session, const CaseRecord& record) {
   if (session.deviceLost() || losesDevice(record.name)) _exit(0);
 }
 
-/// One case after another, in this order, until so many have failed. How much is watched to begin
-/// with is what most mutants fail by, at a third of the time that compiling all of it takes; what
-/// passes is watched whole.
-void runToFailures(Session& session, const std::vector<CaseName>& cases, unsigned failures,
-                   const Observer& observer) {
-  std::vector<CaseName> left;
-  for (const Watch watch : {Watch::kTwinAlone, Watch::kAll}) {
-    session.watchOnly(watch);
-    for (const CaseName& c : watch == Watch::kAll ? std::exchange(left, {}) : cases) {
-      runCases(session, {c}, observer);
-      if (!session.currentCase().failed)
-        left.push_back(c);
-      else if (--failures == 0)
-        return;
-    }
+/// Of these cases, in this order, until so many have failed; returns how many have.
+unsigned failuresOf(Session& session, const std::vector<CaseName>& cases, unsigned atMost,
+                    const Observer& observer) {
+  unsigned failures = 0;
+  for (const CaseName& c : cases) {
+    if (failures == atMost) break;
+    runCases(session, {c}, observer);
+    failures += session.currentCase().failed;
   }
+  return failures;
+}
+
+/// The strict twin alone is what most mutants fail by, at a third of the time that compiling all of
+/// it takes. One that fails by nothing there is watched whole, but by laws, which look at no more.
+void runToFailures(Session& session, std::vector<CaseName> cases, unsigned failures,
+                   const Observer& observer) {
+  session.watchOnly(Watch::kTwinAlone);
+  if (failuresOf(session, cases, failures, observer) > 0) return;
+  session.watchOnly(Watch::kAll);
+  std::erase_if(cases, [](const CaseName& c) { return kindOf(c) == Kind::kLaw; });
+  failuresOf(session, cases, failures, observer);
 }
 
 void judgeMutants(Session& session, const WorkerTask& task, const std::vector<CaseName>& cases,
@@ -135,9 +139,13 @@ void judgeMutants(Session& session, const WorkerTask& task, const std::vector<Ca
   }
 }
 
+/// All cases of the model count what can be altered; those of the task are to tell.
 void judgeModels(Session& session, const WorkerTask& task) {
-  const ModelPlan plan = planModel(session, task.mutated);
+  ModelPlan plan = planModel(session, task.mutated);
   if (task.mutants.empty()) return say(kPlan, toJson(plan.mutants));
+  std::erase_if(plan.cases, [&](const ModelPlan::Case& c) {
+    return std::ranges::find(task.cases, c.name.name) == task.cases.end();
+  });
   for (const std::string& id : task.mutants) {
     const auto m = std::ranges::find(plan.mutants, id, &ModelMutant::id);
     if (m == plan.mutants.end()) throw UsageError("there is no mutant '" + id + "' of the model");

@@ -201,9 +201,12 @@ class Campaign {
 
 }  // namespace
 
-std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& kernel) {
+std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& kernel,
+                                 std::optional<Kind> kind) {
   std::vector<CaseName> cases = selectCases({.stages = {kernel}});
-  std::erase_if(cases, judgesModel);
+  std::erase_if(cases, [&](const CaseName& c) {
+    return !runsKernel(kindOf(c)) || (kind && kindOf(c) != *kind);
+  });
   std::vector<Witness> witnesses;
   std::string broken;
   const auto batches =

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -20,13 +21,14 @@ struct Witness {
   bool usesSubgroups = false;
 };
 
-/// The cases that run the kernel, cheapest first, after they have passed on it. Throws CaseFailure
-/// where one does not: a kernel that is red already tells nothing about its mutants. Cases that are
-/// skipped or unsupported here are left out.
+/// The cases that run the kernel, or those of one such kind, cheapest first, after they have passed
+/// on it. Throws CaseFailure where one does not: a kernel that is red already tells nothing about
+/// its mutants. Cases that are skipped or unsupported here are left out.
 struct CaseFailure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
-std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& kernel);
+std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& kernel,
+                                 std::optional<Kind> kind);
 
 struct CampaignObserver {
   std::function<void(const Mutant&)> begun{};

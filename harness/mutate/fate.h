@@ -17,7 +17,9 @@ struct Kill {
 
 struct Fate {
   std::vector<Kill> kills{};  ///< in the order in which they were found; none: it survives
-  unsigned sought = 1;  ///< so many kills were looked for: fewer means that no other case kills
+  /// So many kills were looked for: fewer means that no other of the cases asked kills it, watched
+  /// as closely as these: what shows in the strict twin is not sought in the module as it is.
+  unsigned sought = 1;
   bool survived() const { return kills.empty(); }
 };
 

@@ -75,18 +75,27 @@ class Inquiry {
     answer.kernel = question.kernel + (question.ofModel ? " model" : "");
     tell("finding mutants");
     question.ofModel ? listModel() : makeMutants();
+    if (!question.mutants.empty())
+      std::erase_if(answer.mutants,
+                    [&](const Mutant& m) { return !question.mutants.contains(m.id); });
     if (question.sample) keepSample(answer.mutants, *question.sample, schedule.session.seed);
     const auto about = circumstances(schedule, prepared, question.kernel);
-    FateCache cache(about ? cacheFile(prepared, answer.kernel) : std::filesystem::path());
+    FateCache cache(about ? cacheFile(prepared, title()) : std::filesystem::path());
     std::vector<Mutant> open = takeKnown(cache, about.value_or(0));
     if (!open.empty() && question.ofModel) judgeModel(open, cache, about.value_or(0));
     if (!open.empty() && !question.ofModel) judge(open, cache, about.value_or(0));
-    if (!question.sample && question.operators.empty()) cache.keepOnly(keys);
+    if (!question.sample && question.operators.empty() && question.mutants.empty())
+      cache.keepOnly(keys);
     answer.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return std::move(answer);
   }
 
  private:
+  /// What the fates are of, and by whom.
+  std::string title() const {
+    return answer.kernel + (question.by ? fmt::format(" by {}", nameOf(*question.by)) : "");
+  }
+
   void makeMutants() {
     const KernelModule module = moduleOf(schedule.session, findKernel(question.kernel));
     MutantSet found = mutantsOf(module.words, question.operators);
@@ -131,7 +140,7 @@ class Inquiry {
 
   void judge(const std::vector<Mutant>& open, FateCache& cache, std::uint64_t about) {
     tell("the kernel itself");
-    const std::vector<Witness> witnesses = witnessesOf(schedule, question.kernel);
+    const std::vector<Witness> witnesses = witnessesOf(schedule, question.kernel, question.by);
     SessionOptions session = schedule.session;
     if (!session.timeout) session.timeout = patience(witnesses);
     session.shrinks = session.probes = false;  // that it fails is all that is asked
@@ -146,7 +155,7 @@ class Inquiry {
     std::vector<std::string> ids;
     for (const Mutant& m : open) ids.push_back(m.id);
     judgeModelMutants(
-        schedule, question.kernel, ids, question.sought,
+        schedule, question.kernel, ids, question.by, question.sought,
         [&](const std::string& id, const Fate& fate) { settle(id, fate, cache, about); });
   }
 

@@ -18,8 +18,10 @@ namespace gnomon {
 struct Question {
   std::string kernel{};                 ///< "brdf/evaluate"
   std::set<std::string> operators{};    ///< by name; empty: all
+  std::set<std::string> mutants{};      ///< by id; empty: all
   std::optional<std::size_t> sample{};  ///< so many of the mutants, chosen by the session's seed
   bool ofModel = false;                 ///< of the kernel's model, whose operators are its own
+  std::optional<Kind> by{};             ///< cases of this kind alone, which judge one or the other
   unsigned sought = 1;                  ///< kills of each: 2 tells whether a case kills alone
 };
 

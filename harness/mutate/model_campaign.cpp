@@ -39,8 +39,12 @@ std::vector<NamedModelMutant> listModelMutants(const Schedule& schedule,
 }
 
 void judgeModelMutants(const Schedule& schedule, const std::string& kernel,
-                       const std::vector<std::string>& ids, unsigned sought,
+                       const std::vector<std::string>& ids, std::optional<Kind> kind,
+                       unsigned sought,
                        const std::function<void(const std::string& id, const Fate&)>& told) {
+  std::vector<std::string> cases;
+  for (const CaseName& c : selectCases({.stages = {kernel}}))
+    if (kind ? kindOf(c) == *kind : judgesModel(kindOf(c))) cases.push_back(c.name);
   std::mutex mutex;
   std::exception_ptr error;
   const auto judge = [&](std::vector<std::string> left) {
@@ -55,6 +59,7 @@ void judgeModelMutants(const Schedule& schedule, const std::string& kernel,
         settle(fateOf(modelOutcome(outcome), sought));
       };
       const WorkerReport report = runWorker({.session = schedule.session,
+                                             .cases = cases,
                                              .mutated = kernel,
                                              .mutants = left,
                                              .models = true,

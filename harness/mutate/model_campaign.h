@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,11 @@ namespace gnomon {
 /// is.
 std::vector<NamedModelMutant> listModelMutants(const Schedule& schedule, const std::string& kernel);
 
-/// The tests on each of these mutants, cheapest first, in workers. `told` is called once for each,
-/// by one thread at a time.
+/// The tests, or those of one kind, on each of these mutants, cheapest first, in workers. `told` is
+/// called once for each, by one thread at a time.
 void judgeModelMutants(const Schedule& schedule, const std::string& kernel,
-                       const std::vector<std::string>& ids, unsigned sought,
+                       const std::vector<std::string>& ids, std::optional<Kind> kind,
+                       unsigned sought,
                        const std::function<void(const std::string& id, const Fate&)>& told);
 
 }  // namespace gnomon

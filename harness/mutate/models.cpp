@@ -23,7 +23,7 @@ std::string firstLine(const CaseRecord& record) {
 
 ModelPlan planModel(Session& session, const std::string& kernel) {
   std::vector<CaseName> cases = selectCases({.stages = {kernel}});
-  std::erase_if(cases, [](const CaseName& c) { return !judgesModel(c); });
+  std::erase_if(cases, [](const CaseName& c) { return !judgesModel(kindOf(c)); });
   ModelPlan plan{.kernel = kernel};
   if (cases.empty()) return plan;
 

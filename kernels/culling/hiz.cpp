@@ -39,8 +39,7 @@ const bool whole = registerKernel({
     .grid = [](const Extent& depth) -> std::array<uint, 3> {
       return {tilesOf(depth.width), tilesOf(depth.height), 1};
     },
-    .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat",
-                 "shaderStorageImageArrayDynamicIndexing"},
+    .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
     .conventions = {{"lookup", {"pinned", "next_pow2", "previous_pow2", "fold3"}}},
     .summary = "the pyramid of farthest depths, all levels in one dispatch",
 });

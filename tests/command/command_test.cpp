@@ -85,6 +85,22 @@ TEST(Command, ListsStagesKernelsAndCases) {
   EXPECT_EQ(cases.output.find("Precision"), std::string::npos) << "another stage's cases";
 }
 
+TEST(Command, TellsTheKindOfEachCase) {
+  const Scratch scratch;
+  const auto file = scratch.path() / "cases.json";
+  ASSERT_EQ(gnomonSays("list cases brdf --json " + file.string()).status, 0);
+  const auto kind = nlohmann::json::parse(std::ifstream(file))["kind"];
+  EXPECT_EQ(kind["BrdfEvaluate.LobeStaysInsideTheBound"], "comparison");
+  EXPECT_EQ(kind["BrdfEvaluateProbes.ContractAndModelNameTheSame"], "comparison");
+  EXPECT_EQ(kind["BrdfEvaluateLaws.AMetalHasNoDiffuse"], "law");
+  EXPECT_EQ(kind["BrdfEvaluateModel.FresnelRisesWithTheFifthPower"], "truth");
+  EXPECT_EQ(kind["BrdfEvaluateParts.EvaluateIsMadeOfItsParts"], "composition");
+  EXPECT_EQ(kind["BrdfEvaluateBound.TheBoundTellsTheUsualConfusionsApart"], "bound");
+  const Said laws = gnomonSays("list cases brdf --kind law");
+  EXPECT_NE(laws.output.find("BrdfEvaluateLaws.AMetalHasNoDiffuse"), std::string::npos);
+  EXPECT_EQ(laws.output.find("LobeStays"), std::string::npos) << laws.output;
+}
+
 TEST(Command, ValidateWritesTheJsonThatScriptsRelyOn) {
   const Scratch scratch;
   const auto file = scratch.path() / "v.json";

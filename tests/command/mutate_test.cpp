@@ -1,5 +1,6 @@
 // `gnomon mutate` as a user and CI meet it: a seeded sample of every kernel and model against the
 // record, kernels of the user's, wrong flags.
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -33,6 +34,29 @@ TEST(Mutate, ASampleOfEveryKernelAndModelIsAsOnRecord) {
       EXPECT_FALSE(survivor["reason"].is_null()) << survivor;
     for (const nlohmann::json& kill : stage["kills"])
       EXPECT_FALSE(kill["by"].get<std::string>().empty()) << kill;
+  }
+}
+
+// tests/mutants/alone.json names for each of them a mutant that would live without it. Cases of the
+// other kinds are not asked, nor is any other mutant: that takes minutes.
+TEST(Mutate, EveryLawAndTruthTestTellsAMutantThatNoOtherDoes) {
+  const Scratch scratch;
+  const nlohmann::json alone = jsonOf(GNOMON_SOURCE_DIR "/tests/mutants/alone.json");
+  std::string ids;
+  for (const nlohmann::json& id : alone) ids += (ids.empty() ? "" : ",") + id.get<std::string>();
+  const auto file = scratch.path() / "kills.json";
+  const Said said = gnomonSays("list cases --kind law,truth --kills --mutants '" + ids +
+                               "' --json " + file.string());
+  ASSERT_EQ(said.status, 0) << said.output;
+  const nlohmann::json cases = jsonOf(file)["cases"];
+  EXPECT_EQ(cases.size(), alone.size()) << "alone.json names a case that is none";
+  for (const nlohmann::json& c : cases) {
+    const std::string name = c["case"], id = alone.value(name, "");
+    const std::vector<std::string> only = c["only"];
+    EXPECT_NE(std::ranges::find(only, id), only.end())
+        << name << " does not alone tell '" << id << "', as tests/mutants/alone.json says.\n"
+        << "`gnomon list cases --kills --json -` lists under \"only\" what it does; where that is "
+           "nothing, strengthen it or merge it with its like";
   }
 }
 
@@ -82,6 +106,8 @@ TEST(Mutate, NamesWhatIsWrongWithItsArguments) {
   refused("mutate no_such_stage", "no_such_stage");
   refused("mutate precision", "precision");
   refused("list kernels --kills", "--kills");
+  refused("list cases --kind nonsense", "nonsense");
+  refused("list cases post --kind truth --kills --mutants no:such", "no:such");
 }
 
 }  // namespace

@@ -39,10 +39,10 @@ struct Found {
 };
 
 Found shrunk(const Scratch& scratch, const std::string& kernel, const fs::path& wrong,
-             const std::string& name) {
+             const std::string& name, const std::string& flags = "") {
   const fs::path out = scratch.path() / "out";
-  return {gnomonSays(fmt::format("validate --filter '{}' --cases 4096 --out {} --kernel {}={}",
-                                 name, out.string(), kernel, wrong.string())),
+  return {gnomonSays(fmt::format("validate {} --filter '{}' --cases 4096 --out {} --kernel {}={}",
+                                 flags, name, out.string(), kernel, wrong.string())),
           out / "failures" / (name + ".json")};
 }
 
@@ -75,6 +75,19 @@ TEST(Replay, AWrongPiShowsOnOneSampleOfAxesAndComesBack) {
   EXPECT_EQ(json["field"], "D");
   ASSERT_EQ(json["input"]["buffers"]["samples"].size(), 1u);
   EXPECT_EQ(json["input"]["buffers"]["samples"][0]["normal"], nlohmann::json({0, 0, 1}));
+}
+
+TEST(Replay, WithoutShrinkingAFailureIsShownAsItWasGenerated) {
+  const Scratch scratch;
+  const fs::path wrong = broken(scratch, "brdf/evaluate", "lib/brdf.glsl", "kPi = 3.14159265358979",
+                                "kPi = 3.14160265358979");
+  const Found found = shrunk(scratch, "brdf/evaluate", wrong,
+                             "BrdfEvaluate.LobeStaysInsideTheBound", "--no-shrink");
+  EXPECT_EQ(found.said.status, 1) << found.said.output;
+  EXPECT_EQ(found.said.output.find("Shrunk"), std::string::npos) << found.said.output;
+  EXPECT_NE(found.said.output.find("reproduce: ./gnomon validate --filter"), std::string::npos)
+      << found.said.output;
+  EXPECT_FALSE(fs::exists(found.file));
 }
 
 // The fault lies between the two thresholds, so the shortest number there is 0.004.

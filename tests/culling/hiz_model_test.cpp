@@ -188,13 +188,16 @@ TEST(CullingHizModel, OtherPyramidsSeeLittleMoreThanTheirOwn) {
     }
 }
 
-// 1920 columns onto 1024 texels: texel 1 has its centre at 2.8125 pixels, between the centres of
-// pixels 2 and 3, and holds the centre of pixel 2 (at 2.5 * 1024 / 1920 = 1.33) and no other.
+// 1920 columns onto 1024 texels, 1.875 a texel. Texel 1 has its centre at 2.8125 pixels, between
+// the centres of 2 and 3, and from 1.875 to 3.75 holds both; texel 0 has it at 0.9375 and to 1.875
+// both of 0 and 1; texel 7 has it at 14.0625, between 13 and 14, and from 13.125 to 15 both.
 TEST(CullingHizModel, APreviousPowerOfTwoTakesTwoPixels) {
   const LookupAxis axis{Lookup::kPreviousPow2, 1920};
   EXPECT_EQ(axis.size(0), 1024u);
-  EXPECT_EQ(axis.most(0, 1), (Range{2, 4}));
-  EXPECT_EQ(axis.own(0, 1), (Range{2, 3}));
+  for (const auto& [texel, taps] : {std::pair(0u, Range{0, 2}), {1u, {2, 4}}, {7u, {13, 15}}}) {
+    EXPECT_EQ(axis.most(0, texel), taps) << texel;
+    EXPECT_EQ(axis.own(0, texel), taps) << texel;
+  }
   EXPECT_EQ(axis.texelOf(0, 2), 1u);
   EXPECT_EQ(axis.texelOf(3, 1919), 127u);
 }

@@ -147,7 +147,8 @@ bool admits(const OcclusionInput& input) {
 }
 
 FrustumStimulus::FrustumStimulus(FrustumInput& input) {
-  input.commands = commandsFor(input.bounds.size());
+  if (input.commands.size() != input.bounds.size())
+    input.commands = commandsFor(input.bounds.size());
   stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
                          {"bounds", std::as_bytes(std::span(input.bounds))},
                          {"commands", std::as_bytes(std::span(input.commands))}},

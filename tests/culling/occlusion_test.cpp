@@ -130,10 +130,12 @@ TEST_F(CullingOcclusionSubgroups, GroupsThatAskAreAnswered) {
 }
 
 TEST_F(CullingOcclusion, SpheresAreListedAsTheModelSaysAtEverySizeOfTheScreen) {
+  widthDoesNotMatter();
   for (const uvec2 size : kSizes) expectRightList(anyInput(kBlock, size, caseSeed() + size.x));
 }
 
 TEST_F(CullingOcclusion, EveryProjectionIsTheModels) {
+  widthDoesNotMatter();
   for (int kind = 0; kind < kSceneKinds; ++kind) {
     const Scene scene = generatedScene(static_cast<SceneKind>(kind), caseSeed());
     expectRightList(occlusionInput(scene.camera, spheresAround(scene, kBlock, caseSeed()),
@@ -146,6 +148,7 @@ Camera flat() { return cameraOf(glm::dmat4(1), orthographic(0, 64, 0, 64, 1, 65)
 
 // Squares of every number of pixels, their edges just inside a pixel's or on it: exact in float.
 TEST_F(CullingOcclusion, RectanglesOfEveryNumberOfPixelsFindTheirLevel) {
+  widthDoesNotMatter();
   Random random(caseSeed());
   std::vector<Bounds> all;
   for (int pixels = 1; pixels <= 64; ++pixels)
@@ -170,6 +173,7 @@ TEST_F(CullingOcclusion, SurvivorsMayBeAnyPartOfTheObjects) {
 
 // Six units of numbers that code treats wrongly, in every place.
 TEST_F(CullingOcclusion, BadBoundsAreVisible) {
+  widthDoesNotMatter();
   std::vector<Bounds> all;
   for (const float x : specialFloats({kMostWorld, -kMostWorld, 2 * kMostWorld, -1.0f, 5.0f})) {
     all.push_back({{x, 0, -50}, 1});
@@ -188,6 +192,7 @@ TEST_F(CullingOcclusion, DrawsOfNoObjectAreVisible) {
 
 // One pixel each: a bad depth is sky, which hides nothing.
 TEST_F(CullingOcclusion, BadDepthsHideNothing) {
+  widthDoesNotMatter();
   const std::vector<float> special = specialFloats({0.25f});
   const auto n = static_cast<uint>(special.size());
   Picture depth = filled({n, n}, 0.25f);
@@ -204,6 +209,7 @@ TEST_F(CullingOcclusion, BadDepthsHideNothing) {
 
 // Behind the wall at distance 8, before it, through it, and where it has a hole of one pixel.
 TEST_F(CullingOcclusion, AWallHidesWhatIsBehindItAtEverySize) {
+  widthDoesNotMatter();
   for (const uvec2 size : kSizes) {
     Random random(caseSeed());
     std::vector<Bounds> all;
@@ -224,6 +230,7 @@ TEST_F(CullingOcclusion, AWallHidesWhatIsBehindItAtEverySize) {
 }
 
 TEST_F(CullingOcclusion, NothingThatARaySeesIsHidden) {
+  widthDoesNotMatter();
   const std::size_t count = scenesOfEachKind();
   for (int kind = 0; kind < kSceneKinds; ++kind)
     for (std::size_t s = 0; s < count; ++s) {

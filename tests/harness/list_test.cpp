@@ -488,6 +488,16 @@ TEST_F(ListOnDevice, ARightKernelConformsAsASet) {
   }
 }
 
+TEST_F(ListOnDevice, AListWithoutRoomIsCleanAndDecidesNothing) {
+  Observation seen = observed(listing(), 0);
+  const KernelRecord r = record();
+  const std::vector<Draw> all = candidates(kMany);
+  EXPECT_EQ(decodeList(r, r.list("visible"), std::as_bytes(std::span(all)), 0, seen), 0u);
+  EXPECT_EQ(seen.findings, Lines{});
+  EXPECT_EQ(elementsOf<uint>(seen.twin.at("stats")), (std::vector<uint>{50, 0, 1}));
+  EXPECT_EQ(judged(*gpu, seen, 0, false).verdict, Class::kConforms);
+}
+
 TEST_F(ListOnDevice, ScratchThatIsLeftBehindIsFound) {
   const Observation seen = observed(listing("if (g != 2) scratch[g].value = 0"), 64);
   const std::string rest =

@@ -1,10 +1,9 @@
 // Scratch: memory of a kernel's own that is zero before every dispatch and zero again after it.
 //
-// Covered: a kernel that cleans up, one that does not, one that does only in the usual order, writes
-// outside, a buffer that is too short; a foreign kernel without scratch, with scratch of its own
-// making, and adapters that misname it.
-// Not covered: scratch that shares a buffer with outputs, writes before its start, runs that are
-// timed.
+// Covered: a kernel that cleans up, one that does not, one that does only in the usual order,
+// writes outside, a buffer that is too short; a foreign kernel without scratch, with scratch of its
+// own making, and adapters that misname it. Not covered: scratch that shares a buffer with outputs,
+// writes before its start, runs that are timed.
 #include "harness/hygiene/observe.h"
 
 #include <memory>

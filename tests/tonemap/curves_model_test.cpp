@@ -2,7 +2,8 @@
 // from it. No GPU.
 //
 // Covered: every curve against printed values, limits and slopes; Hill's matrices against the
-// primaries that they come from; both transfer functions against closed forms and an inverse. ACES
+// primaries that they come from; both transfer functions against closed forms and an inverse;
+// each number against the function that it stands for. ACES
 // itself is a yardstick in tests/reference/tonemap_ocio_test.cpp.
 // Not covered: colours outside Rec. 709.
 #include <array>
@@ -65,7 +66,7 @@ struct Entry {
 
 // Printed to six digits. Every term of numerator and denominator is positive, so their constants
 // move the quotient by half an ULP each.
-TEST(TonemapResolveModel, NarkowiczIsHisPrintedFormula) {
+void expectHisPrintedValues() {
   constexpr std::array<Entry, 9> kTable = {{{0, 0},
                                             {0.001, 0.000231},
                                             {0.01, 0.003770},
@@ -82,13 +83,18 @@ TEST(TonemapResolveModel, NarkowiczIsHisPrintedFormula) {
 
 // Ends and crossing of x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14): at infinity the ratio of the
 // leading coefficients, at 0 that of the last ones; it is 1 where 0.08 x^2 - 0.56 x - 0.14 = 0.
-TEST(TonemapResolveModel, NarkowiczHasTheSlopeTheCrossingAndTheLimitOfHisCoefficients) {
+void expectTheSlopeTheCrossingAndTheLimitOfHisCoefficients() {
   const double far = 0x1p60, near = 0x1p-60;  // the other terms are below 2^-53 of the result
   EXPECT_LE(std::abs(narkowicz(far) / (2.51 / 2.43) - 1), 2 * kHalfUlp);
   EXPECT_LE(std::abs(narkowicz(near) / near / (3.0 / 14) - 1), 2 * kHalfUlp);
   const double crossing = (0.56 + std::sqrt(0.56 * 0.56 + 4 * 0.08 * 0.14)) / (2 * 0.08);
   EXPECT_LE(std::abs(crossing - 7.241657), kPrinted);
   EXPECT_LE(std::abs(narkowicz(crossing) - 1), 2 * kHalfUlp);
+}
+
+TEST(TonemapResolveModel, NarkowiczIsHisPrintedFormula) {
+  expectHisPrintedValues();
+  expectTheSlopeTheCrossingAndTheLimitOfHisCoefficients();
 }
 
 // Reinhard et al. 2002, eq. 3: 0.18 / 1.18, 1 / 2, 4 / 5. Inverse: y / (1 - y).
@@ -107,7 +113,7 @@ TEST(TonemapResolveModel, ReinhardIsEquationThree) {
 // rows have absolute sums of at most 1.60475 + 0.53108 + 0.07367 < 2.25.
 constexpr double kHillConstants = 4 * kHalfUlp * 2.25 / 0.983729;
 
-TEST(TonemapResolveModel, HillIsThePublishedTable) {
+void expectHillsPublishedTable() {
   constexpr std::array<Entry, 5> kGrey = {
       {{0.18, 0.105591}, {0.5, 0.374308}, {1, 0.619115}, {2, 0.803562}, {10, 0.973822}}};
   for (const auto [x, y] : kGrey)
@@ -125,7 +131,7 @@ double rrtAndOdt(double v) {
 
 // The rows of both matrices are printed to five digits and sum to 1 within their rounding. What
 // enters the fit moves the result by v fit'(v) < 0.37 of it, what leaves it by fit(v) < 1.02.
-TEST(TonemapResolveModel, HillKeepsGreyGrey) {
+void expectThatHillKeepsGreyGrey() {
   constexpr double kRowSum = 3 * 0.5e-5;
   for (double x = 0x1p-10; x <= 0x1p10; x *= 2) {
     const Vec3<double> y = hill(Vec3<double>(x));
@@ -136,7 +142,7 @@ TEST(TonemapResolveModel, HillKeepsGreyGrey) {
 }
 
 // The fit's constant terms alone, which no other value shows; they move by half an ULP each.
-TEST(TonemapResolveModel, HillsBlackIsTheRatioOfTheConstantTerms) {
+void expectThatHillsBlackIsTheRatioOfTheConstantTerms() {
   const double black = 0.000090537 / 0.238081;
   for (std::size_t c = 0; c < 3; ++c)
     EXPECT_LE(std::abs(hill(Vec3<double>(0))[c] + black), (3 * 0.5e-5 + kHillConstants) * black);
@@ -145,7 +151,7 @@ TEST(TonemapResolveModel, HillsBlackIsTheRatioOfTheConstantTerms) {
 // Around black the curve is linear: how component i rises with colour c is the printed matrices'
 // product times the slope of the printed fit at 0, (p / q)' = (p' q - p q') / q^2. Every term of it
 // is moved by half an ULP of one coefficient of either matrix and of the slope's five factors.
-TEST(TonemapResolveModel, HillRisesFromBlackByThePrintedMatricesAndTheFitsSlope) {
+void expectThatHillRisesByThePrintedMatricesAndTheFitsSlope() {
   const glm::dmat3 in(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566,
                       0.83777);
   const glm::dmat3 out(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605,
@@ -170,8 +176,13 @@ TEST(TonemapResolveModel, HillRisesFromBlackByThePrintedMatricesAndTheFitsSlope)
   }
 }
 
+TEST(TonemapResolveModel, HillRisesFromBlackByHisPrintedCoefficients) {
+  expectThatHillsBlackIsTheRatioOfTheConstantTerms();
+  expectThatHillRisesByThePrintedMatricesAndTheFitsSlope();
+}
+
 // The number chooses; the functions have been tested above, each by itself.
-TEST(TonemapResolveModel, EveryNumberIsItsOwnCurveAndTransferFunction) {
+TEST(TonemapResolveParts, EveryNumberIsItsOwnCurveAndTransferFunction) {
   Random random(caseSeed());
   const auto light = [&] { return random.chance(0.1) ? 0.0 : random.logUniform(0x1p-20, 0x1p6); };
   for (int i = 0; i < 1000; ++i) {
@@ -211,7 +222,7 @@ glm::dmat3 bradford(const glm::dvec2& from, const glm::dvec2& to) {
 // Hill's comments: sRGB => XYZ => D65_2_D60 => AP1 => RRT_SAT, and ODT_SAT => XYZ => D60_2_D65 =>
 // sRGB. Chromaticities: ITU-R BT.709, SMPTE ST 2065-1 (white), ACES S-2014-004 (AP1). Saturation of
 // ACES 1.0: towards the luminance of AP1 by 0.96 in the RRT, 0.93 in the ODT.
-TEST(TonemapResolveModel, HillsMatricesAreThePrimariesAndSaturationsOfAces) {
+void expectThePrimariesAndSaturationsOfAces() {
   const glm::dvec2 d65(0.3127, 0.3290), d60(0.32168, 0.33767);
   const glm::dmat3 rec709 = toXyz({{{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}}}, d65);
   const glm::dmat3 ap1 = toXyz({{{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}}}, d60);
@@ -236,6 +247,22 @@ TEST(TonemapResolveModel, HillsMatricesAreThePrimariesAndSaturationsOfAces) {
   }
 }
 
+// The leading coefficients' ratio, through output rows that sum to 1 within five digits.
+void expectThatHillsWhiteIsItsLimitAndSaturates() {
+  const Vec3<double> white = hill(Vec3<double>(kMaxScene));
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_LE(std::abs(white[c] - 1 / 0.983729), 3 * 0.5e-5 / 0.983729 + kHillConstants);
+    EXPECT_GT(white[c], 1);
+  }
+}
+
+TEST(TonemapResolveModel, HillIsAsPublishedOnGreyOnColoursAndAtWhite) {
+  expectHillsPublishedTable();
+  expectThatHillKeepsGreyGrey();
+  expectThePrimariesAndSaturationsOfAces();
+  expectThatHillsWhiteIsItsLimitAndSaturates();
+}
+
 // By the contract black is 0 and white saturates in every curve but Reinhard's, which tends to 1.
 TEST(TonemapResolveModel, CurvesOfGreyRiseFromBlackToWhite) {
   for (const uint which : kCurves) {
@@ -248,15 +275,6 @@ TEST(TonemapResolveModel, CurvesOfGreyRiseFromBlackToWhite) {
       before = display(x);
     }
     EXPECT_GE(display(kMaxScene), which == kReinhard ? kMaxScene / (1.0 + kMaxScene) : 1) << which;
-  }
-}
-
-// The leading coefficients' ratio, through output rows that sum to 1 within five digits.
-TEST(TonemapResolveModel, WhiteIsHillsLimitAndSaturates) {
-  const Vec3<double> white = hill(Vec3<double>(kMaxScene));
-  for (std::size_t c = 0; c < 3; ++c) {
-    EXPECT_LE(std::abs(white[c] - 1 / 0.983729), 3 * 0.5e-5 / 0.983729 + kHillConstants);
-    EXPECT_GT(white[c], 1);
   }
 }
 
@@ -288,11 +306,15 @@ TEST(TonemapResolveModel, SrgbIsContinuousButForTheKnownJump) {
   }
 }
 
-TEST(TonemapResolveModel, TransfersKeepBlackAndWhite) {
+TEST(TonemapResolveModel, TransfersRiseFromBlackToWhite) {
   for (const uint which : kTransfers) {
     EXPECT_EQ(transfer(which, 0.0), 0) << which;
     EXPECT_LE(std::abs(transfer(which, 1.0) - 1), 2 * kHalfUlp) << which;  // 1.055f - 0.055f
   }
+  for (const uint which : {kGamma, kSrgb})
+    for (double x = 0; x < 1; x += 0x1p-12)
+      // But for the jump of sRGB, which the step is far above.
+      EXPECT_LT(transfer(which, x), transfer(which, x + 0x1p-12)) << which << " at " << x;
 }
 
 // 0.5^(1 / 2.2) and, where the exponent's half ULP counts most, |ln 2^-24| / 2.2 of it.
@@ -311,28 +333,6 @@ TEST(TonemapResolveModel, GammaBeginsAtTheSmallestNormalFloat) {
     EXPECT_LE(std::abs(encode(least) / first - 1), 126 * std::log(2.0) / 2.2 * kHalfUlp);
     EXPECT_EQ(encode(below), 0);
   }
-}
-
-// sRGB is the lighter by 0.0058 at most, at 0.413, and the darker by 0.0335, at the x where the
-// power's slope is 12.92: (2.2 * 12.92)^(-2.2 / 1.2) = 0.00216.
-TEST(TonemapResolveModel, GammaAndSrgbDifferByThePublishedAmounts) {
-  Entry most{0, 0}, least{0, 0};
-  for (double x = 0; x <= 1; x += 0x1p-14) {
-    const double difference = encodeSrgb(x) - encodeGamma(x);
-    if (difference > most.y) most = {x, difference};
-    if (difference < least.y) least = {x, difference};
-  }
-  EXPECT_LE(std::abs(most.y - 0.0058), 0.5e-4);
-  EXPECT_LE(std::abs(most.x - 0.413), 0.5e-3 + 0x1p-14);
-  EXPECT_LE(std::abs(least.y + 0.0335), 0.5e-4);
-  EXPECT_LE(std::abs(least.x - std::pow(2.2 * 12.92, -2.2 / 1.2)), 0x1p-14);
-}
-
-TEST(TonemapResolveModel, TransfersRise) {
-  for (const uint which : {kGamma, kSrgb})
-    for (double x = 0; x < 1; x += 0x1p-12)
-      // But for the jump of sRGB, which the step is far above.
-      EXPECT_LT(transfer(which, x), transfer(which, x + 0x1p-12)) << which << " at " << x;
 }
 
 }  // namespace

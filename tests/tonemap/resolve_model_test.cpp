@@ -89,7 +89,7 @@ std::string describe(const uvec2& bloom, const uvec2& size, const uvec2& at) {
                      size.x, size.y);
 }
 
-TEST(TonemapResolveModel, ConstantBloomStaysConstant) {
+void expectThatConstantBloomStaysConstant() {
   const vec3 colour(0.1f, 3, 700);
   forEachPixel([&](const uvec2& bloom, const uvec2& size, const uvec2& at) {
     const Painted image(bloom, [&](uint, uint) { return colour; });
@@ -100,7 +100,7 @@ TEST(TonemapResolveModel, ConstantBloomStaysConstant) {
   });
 }
 
-TEST(TonemapResolveModel, BloomOfTheImagesSizeIsTakenTexelByTexel) {
+void expectThatBloomOfTheImagesSizeIsTakenTexelByTexel() {
   const uvec2 size(5, 4);
   const Painted image(size, [](uint x, uint y) { return vec3(x, y, 7 * y + x); });
   for (uint y = 0; y < size.y; ++y)
@@ -119,7 +119,7 @@ double ramp(double x, double w, double n) {
 }
 
 // Bilinear reproduces a ramp along x, one along y and their product between the outer centres.
-TEST(TonemapResolveModel, BloomReproducesRampsAndHoldsTheEdge) {
+void expectThatRampsAreReproducedAndTheEdgeIsHeld() {
   forEachPixel([&](const uvec2& bloom, const uvec2& size, const uvec2& at) {
     const Painted image(bloom, [](uint x, uint y) { return vec3(x, y, x * y); });
     const double u = ramp(at.x, size.x, bloom.x), v = ramp(at.y, size.y, bloom.y);
@@ -133,7 +133,7 @@ TEST(TonemapResolveModel, BloomReproducesRampsAndHoldsTheEdge) {
 }
 
 // At half size a pixel is a quarter of a texel from its own texel's centre: 3/4 and 1/4, exactly.
-TEST(TonemapResolveModel, HalfSizeBloomIsMixedOneToThree) {
+void expectThatHalfSizeIsMixedOneToThree() {
   const Painted image({2, 2}, [](uint x, uint y) { return vec3(x + 2 * y == 0); });
   const std::array<double, 4> weight = {1, 0.75, 0.25, 0};
   for (uint y = 0; y < 4; ++y)
@@ -141,7 +141,7 @@ TEST(TonemapResolveModel, HalfSizeBloomIsMixedOneToThree) {
       EXPECT_EQ(bloomAt(image, {4, 4}, {x, y}).x, weight[x] * weight[y]) << x << " " << y;
 }
 
-TEST(TonemapResolveModel, WeightsOfBloomAreNotNegativeAndSumToOne) {
+void expectThatWeightsAreNotNegativeAndSumToOne() {
   forEachPixel([&](const uvec2& bloom, const uvec2& size, const uvec2& at) {
     double sum = 0;
     for (uint i = 0; i < bloom.x * bloom.y; ++i) {
@@ -152,6 +152,14 @@ TEST(TonemapResolveModel, WeightsOfBloomAreNotNegativeAndSumToOne) {
     }
     EXPECT_LE(std::abs(sum - 1), kDouble) << describe(bloom, size, at);
   });
+}
+
+TEST(TonemapResolveModel, BloomIsFilteredBilinearlyBetweenItsCentres) {
+  expectThatConstantBloomStaysConstant();
+  expectThatBloomOfTheImagesSizeIsTakenTexelByTexel();
+  expectThatRampsAreReproducedAndTheEdgeIsHeld();
+  expectThatHalfSizeIsMixedOneToThree();
+  expectThatWeightsAreNotNegativeAndSumToOne();
 }
 
 Resolve settings(uint curve, uint transfer, float exposure = 1, float intensity = 0) {
@@ -178,7 +186,7 @@ vec3 colour(Random& random, double lo, double hi) {
 }
 
 // Doubling is exact, so the two sides meet bit by bit.
-TEST(TonemapResolveModel, DoubledLightIsOneMoreStopOfExposure) {
+void expectThatDoubledLightIsOneMoreStop() {
   Random random(caseSeed());
   for (const uint curve : kCurves)
     for (const uint transfer : kTransfers)
@@ -189,19 +197,6 @@ TEST(TonemapResolveModel, DoubledLightIsOneMoreStopOfExposure) {
                    pixel(settings(curve, transfer, exposure * 2, 0.25f), hdr, bloom),
                    fmt::format("curve {}, transfer {}", curve, transfer));
       }
-}
-
-// (1/8 + 1/2 * 1/4) * 2 = 1/2 in each step's own place: of the curve 1/2 comes out as the curve of
-// 1/2, which no other order gives.
-TEST(TonemapResolveModel, BloomIsAddedThenExposedThenBentThenSaturatedThenEncoded) {
-  for (const uint which : kCurves) {
-    const Vec3<double> bent = curve(which, Vec3<double>(0.5));
-    for (const uint code : kTransfers) {
-      const Vec4<double> got = pixel(settings(which, code, 2, 0.25f), vec3(0.125f), vec3(0.5f));
-      for (std::size_t c = 0; c < 3; ++c)
-        EXPECT_EQ(got[c], transfer(code, bent[c])) << which << " " << code;
-    }
-  }
 }
 
 // Ramps again, this time through the whole of resolve: multiples of 2^-6 that stay below 1.
@@ -238,7 +233,7 @@ Vec4<double> madeOfItsParts(const Resolve& push, const Painted& hdr, const Paint
 }
 
 // From black over what shows every digit to beyond the largest scene, either sign.
-TEST(TonemapResolveModel, APixelIsMadeOfItsParts) {
+TEST(TonemapResolveParts, APixelIsMadeOfItsParts) {
   Random random(caseSeed());
   const auto any = [&](uint, uint) {
     const auto light = [&] {
@@ -292,7 +287,7 @@ TEST(TonemapResolveModel, OnlyWhatTheCurveReturnsIsSaturated) {
   EXPECT_EQ(pixel(settings(kHill, kNone), vec3(1, 0, 0)).y, 0);  // negative before
 }
 
-TEST(TonemapResolveModel, TheDisplayValueIsEncodedOnce) {
+void expectThatTheDisplayValueIsEncodedOnce() {
   // The exponent's half ULP, |ln 0.2| / 2.2 < 1, and those of sRGB's three constants.
   constexpr double kConstants = 4 * kHalfUlp;
   for (const float x : {0.2f, 0.5f, 0.9f}) {
@@ -303,6 +298,24 @@ TEST(TonemapResolveModel, TheDisplayValueIsEncodedOnce) {
                        (1.055 * std::pow(x, 1 / 2.4) - 0.055)),
               kConstants);
   }
+}
+
+// (1/8 + 1/2 * 1/4) * 2 = 1/2 in each step's own place: of the curve 1/2 comes out as the curve of
+// 1/2, which no other order gives.
+void expectThatEveryStepHasItsPlace() {
+  for (const uint which : kCurves) {
+    const Vec3<double> bent = curve(which, Vec3<double>(0.5));
+    for (const uint code : kTransfers) {
+      const Vec4<double> got = pixel(settings(which, code, 2, 0.25f), vec3(0.125f), vec3(0.5f));
+      for (std::size_t c = 0; c < 3; ++c)
+        EXPECT_EQ(got[c], transfer(code, bent[c])) << which << " " << code;
+    }
+  }
+}
+
+TEST(TonemapResolveModel, BloomIsAddedThenExposedThenBentThenSaturatedThenEncoded) {
+  expectThatEveryStepHasItsPlace();
+  expectThatTheDisplayValueIsEncodedOnce();
 }
 
 TEST(TonemapResolveModel, ResultsLieInZeroToOneAndAlphaIsOne) {
@@ -324,7 +337,7 @@ TEST(TonemapResolveModel, ResultsLieInZeroToOneAndAlphaIsOne) {
 
 // Curves of a negative x are meaningless (Narkowicz's is positive again below -0.012); but light is
 // clamped after bloom is added: -1/4 + 1/2 * 1 is the light 1/4.
-TEST(TonemapResolveModel, NegativeLightIsBlackUnlessBloomMakesUpForIt) {
+void expectThatNegativeLightIsBlackUnlessBloomMakesUpForIt() {
   for (const uint which : kCurves) {
     for (const float x : {-0.01f, -1.0f, -1e30f})
       EXPECT_EQ(pixel(settings(which, kSrgb), vec3(x)).x, 0) << which << " of " << x;
@@ -334,14 +347,14 @@ TEST(TonemapResolveModel, NegativeLightIsBlackUnlessBloomMakesUpForIt) {
   }
 }
 
-TEST(TonemapResolveModel, UnknownCodesAreLinearAndNone) {
+void expectThatUnknownCodesAreLinearAndNone() {
   const vec3 hdr(0.1f, 0.5f, 0.9f);
   expectSame(pixel(settings(kHill + 1, kSrgb + 1), hdr), pixel(settings(kLinear, kNone), hdr),
              "+1");
   expectSame(pixel(settings(~0u, ~0u), hdr), pixel(settings(kLinear, kNone), hdr), "~0");
 }
 
-TEST(TonemapResolveModel, NanAndMinusInfinityCountAsZeroAndInfinityAsTheLargestScene) {
+void expectThatNanAndInfinitiesCountAsNumbers() {
   const float bads[] = {kQuiet, -kInf, kInf}, goods[] = {0, 0, kMaxScene};
   for (const uint curve : kCurves)
     for (int c = 0; c < 3; ++c)
@@ -359,7 +372,7 @@ TEST(TonemapResolveModel, NanAndMinusInfinityCountAsZeroAndInfinityAsTheLargestS
       }
 }
 
-TEST(TonemapResolveModel, InfiniteLightIsWhiteAndMinusInfiniteOrNanBlackInEveryCurve) {
+void expectThatInfiniteLightIsWhiteAndNanBlack() {
   for (const uint which : kCurves) {
     for (std::size_t c = 0; c < 3; ++c) {
       // Reinhard's 1 - 1 / (1 + kMaxScene) is 1 in float.
@@ -371,7 +384,7 @@ TEST(TonemapResolveModel, InfiniteLightIsWhiteAndMinusInfiniteOrNanBlackInEveryC
 }
 
 // A bad texel is replaced before it is filtered, and only where it has weight.
-TEST(TonemapResolveModel, ABadTexelOfBloomDoesNotSpreadAsNan) {
+void expectThatABadTexelOfBloomDoesNotSpreadAsNan() {
   const auto image = [](float corner) {
     return Painted({2, 2}, [=](uint x, uint y) { return vec3(x + y == 0 ? corner : 1.0f); });
   };
@@ -379,15 +392,24 @@ TEST(TonemapResolveModel, ABadTexelOfBloomDoesNotSpreadAsNan) {
     EXPECT_EQ(bloomAt(image(kQuiet), {4, 4}, {x, 1}).x, bloomAt(image(0), {4, 4}, {x, 1}).x);
 }
 
-TEST(TonemapResolveModel, AlphaIsNotLookedAt) {
+void expectThatAlphaIsNotLookedAt() {
   const std::vector<vec4> hdr = {{0.1f, 0.2f, 0.3f, kQuiet}}, bloom = {{1, 2, 3, kInf}};
   const Resolve push = settings(kHill, kSrgb, 1, 0.5f);
   expectSame(resolve(push, {uvec2(1), hdr}, {uvec2(1), bloom}, uvec2(0)),
              pixel(push, vec3(0.1f, 0.2f, 0.3f), vec3(1, 2, 3)), "alpha NaN and Inf");
 }
 
+TEST(TonemapResolveModel, BadInputCountsAsTheContractSays) {
+  expectThatNegativeLightIsBlackUnlessBloomMakesUpForIt();
+  expectThatUnknownCodesAreLinearAndNone();
+  expectThatNanAndInfinitiesCountAsNumbers();
+  expectThatInfiniteLightIsWhiteAndNanBlack();
+  expectThatABadTexelOfBloomDoesNotSpreadAsNan();
+  expectThatAlphaIsNotLookedAt();
+}
+
 // The scene's largest value is the clamp itself, at any exposure and with bloom on top.
-TEST(TonemapResolveModel, ExposedLightIsClampedToTheLargestScene) {
+void expectThatExposedLightIsClampedToTheLargestScene() {
   const float huge = std::numeric_limits<float>::max();
   for (const uint which : kCurves) {
     const Vec3<double> top = clamp(curve(which, Vec3<double>(kMaxScene)), 0.0, 1.0);
@@ -396,6 +418,11 @@ TEST(TonemapResolveModel, ExposedLightIsClampedToTheLargestScene) {
   // Mixed colours show it: without the clamp red would be 2^32 of the others in Hill's matrices.
   expectSame(pixel(settings(kHill, kNone, 0x1p32f), vec3(huge, 1, 1)),
              pixel(settings(kHill, kNone), vec3(kMaxScene)), "saturated by exposure");
+}
+
+TEST(TonemapResolveModel, ExposureScalesLightUpToTheLargestScene) {
+  expectThatDoubledLightIsOneMoreStop();
+  expectThatExposedLightIsClampedToTheLargestScene();
 }
 
 // Random pixels under 4 x 3 of bloom for 7 x 5: colours around middle grey, EV -4 to 4.
@@ -414,7 +441,7 @@ void forEachBound(uint curve, uint transfer, int stops, const F& f) {
 
 // The bound's ends are floats, and the plain value skips the roundings that lead there: it may lie
 // a step of float outside.
-TEST(TonemapResolveModel, TheValueLiesInTheBoundOrAFloatBesideIt) {
+TEST(TonemapResolveBound, TheValueLiesInTheBoundOrAFloatBesideIt) {
   for (const uint curve : kCurves)
     for (const uint transfer : kTransfers)
       for (const int stops : {-4, 0, 4})
@@ -432,7 +459,7 @@ TEST(TonemapResolveModel, TheValueLiesInTheBoundOrAFloatBesideIt) {
 
 // Whatever half floats and bad input can hold, at the ends of exposure: no operation leaves its
 // specified domain and no NaN comes about.
-TEST(TonemapResolveModel, BadInputAndTheEndsOfExposureStayInsideEveryDomain) {
+TEST(TonemapResolveBound, BadInputAndTheEndsOfExposureStayInsideEveryDomain) {
   constexpr std::array kHard = {kQuiet, -kInf, kInf, -65504.0f, 0.0f, 0x1p-24f, 65504.0f};
   for (const uint curve : kCurves)
     for (const uint transfer : kTransfers)
@@ -461,7 +488,7 @@ double median(std::vector<double> all) {
 // An RGBA8 target resolves half a step of 1 / 255, 2e-3: an interval of 1e-4 is a twentieth of it,
 // so that whatever changes a pixel of the frame leaves the interval. Measured: 0.8e-6 (linear, no
 // encoding) to 6.7e-6 (Hill), 2.6e-6 for Narkowicz with gamma.
-TEST(TonemapResolveModel, HalfOfTheBoundsAreFarNarrowerThanAStepOfTheTarget) {
+TEST(TonemapResolveBound, HalfOfTheBoundsAreFarNarrowerThanAStepOfTheTarget) {
   for (const uint curve : kCurves)
     for (const uint transfer : kTransfers) {
       std::vector<double> widths;
@@ -479,7 +506,7 @@ TEST(TonemapResolveModel, HalfOfTheBoundsAreFarNarrowerThanAStepOfTheTarget) {
 
 // Each pair of curves and of transfer functions is told apart wherever it differs by more than the
 // bound is wide, which is nearly everywhere.
-TEST(TonemapResolveModel, TheBoundTellsCurvesAndTransfersApart) {
+TEST(TonemapResolveBound, TheBoundTellsCurvesAndTransfersApart) {
   std::size_t seen = 0, apart = 0;
   const auto count = [&](double other, const Bounded& allowed) {
     ++seen;
