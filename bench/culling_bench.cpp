@@ -7,10 +7,11 @@ namespace {
 
 using Timer = void (*)(benchmark::State&, const std::string&, const Case&);
 
-void add(const std::string& kernel, Timer timer) {
-  timed(benchmark::RegisterBenchmark((kernel + "/1000000").c_str(), [=](benchmark::State& state) {
-    timer(state, kernel, caseOf(WorldKind::kCity, kMostObjects, 1));
-  }));
+void add(const std::string& kernel, Timer timer, const std::string& what = {}) {
+  timed(benchmark::RegisterBenchmark(
+      (kernel + what + "/1000000").c_str(), [=](benchmark::State& state) {
+        timer(state, kernel, caseOf(WorldKind::kCity, kMostObjects, 1));
+      }));
 }
 
 const bool registered = [] {
@@ -18,6 +19,7 @@ const bool registered = [] {
     add(std::string("culling/frustum") + ending, timeFrustum);
     add(std::string("culling/occlusion") + ending, timeOcclusion);
   }
+  add("culling/occlusion", timeOcclusionOfAll, "/all");
   return true;
 }();
 

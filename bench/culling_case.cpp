@@ -11,6 +11,18 @@ namespace {
 
 constexpr uvec2 kScreen{1920, 1080};
 
+ImageDescription depthOfScreen() {
+  return {.format = PixelFormat::kD32, .width = kScreen.x, .height = kScreen.y};
+}
+
+/// Its levels from 1 on.
+ImageDescription pyramidOfScreen() {
+  return {.format = PixelFormat::kR32f,
+          .width = kScreen.x / 2,
+          .height = kScreen.y / 2,
+          .mips = fullMipCount(kScreen.x / 2, kScreen.y / 2)};
+}
+
 template <class T>
 std::span<const std::byte> bytesOf(const T& object) {
   return std::as_bytes(std::span(&object, 1));
@@ -27,6 +39,36 @@ void countTally(benchmark::State& state, std::size_t before, const Written& writ
 
 std::size_t scratchOf(std::size_t candidates) {
   return kBlocks + std::max<std::size_t>((candidates + kBlock - 1) / kBlock, 1);
+}
+
+void timeCandidates(benchmark::State& state, const std::string& kernel, const Case& c,
+                    std::span<const DrawCommand> draws) {
+  const std::size_t candidates = draws.size();
+  const auto n = static_cast<uint>(candidates);
+  const Occlusion push{.size = kScreen,
+                       .objects = static_cast<uint>(c.objects),
+                       .candidates = n,
+                       .capacity = n,
+                       .pad = c.world.pad,
+                       .patience = kPatience};
+  const Tally found{
+      .tested = push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0};
+  // The draw and the sphere of every candidate; texels, and what is written, are not known before.
+  const std::size_t bytes = sizeof(Camera) + candidates * (sizeof(DrawCommand) + sizeof(Bounds));
+  countTally(
+      state, candidates,
+      timeKernel(state, kernel,
+                 {.inputs = {{"camera", bytesOf(c.world.camera)},
+                             {"bounds", std::as_bytes(std::span(c.world.bounds))},
+                             {"survivors", std::as_bytes(draws)},
+                             {"found", bytesOf(found)}},
+                  .outputs = {{"draws", candidates, /*list=*/true}, {"tally", 1}},
+                  .scratch = {{"scratch", scratchOf(candidates)}},
+                  .inputImages = {{"depth", depthOfScreen(), std::as_bytes(std::span(c.depth))},
+                                  {"pyramid", pyramidOfScreen(), std::as_bytes(std::span(c.mips))}},
+                  .push = bytesOf(push),
+                  .extent = {candidates}},
+                 bytes));
 }
 
 }  // namespace
@@ -78,38 +120,27 @@ void timeFrustum(benchmark::State& state, const std::string& kernel, const Case&
                         bytes));
 }
 
+void timeHiz(benchmark::State& state, const std::string& kernel, const Case& c) {
+  const Hiz push{.size = kScreen};
+  const ImageDescription pyramid = pyramidOfScreen();
+  const std::size_t tiles = std::size_t{kScreen.x >> kHizTile} * (kScreen.y >> kHizTile);
+  timeKernel(state, kernel,
+             {.scratch = {{"scratch", 1 + tiles}},
+              .inputImages = {{"depth", depthOfScreen(), std::as_bytes(std::span(c.depth))}},
+              .outputImages = {{.image = "levels",
+                                .width = pyramid.width,
+                                .height = pyramid.height,
+                                .mips = pyramid.mips}},
+              .push = bytesOf(push),
+              .extent = {kScreen.x, kScreen.y}});
+}
+
 void timeOcclusion(benchmark::State& state, const std::string& kernel, const Case& c) {
-  const std::size_t candidates = c.survivors.size();
-  const auto n = static_cast<uint>(candidates);
-  const Occlusion push{.size = kScreen,
-                       .objects = static_cast<uint>(c.objects),
-                       .candidates = n,
-                       .capacity = n,
-                       .pad = c.world.pad,
-                       .patience = kPatience};
-  const Tally found{
-      .tested = push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0};
-  // The draw and the sphere of every candidate; texels, and what is written, are not known before.
-  const std::size_t bytes = sizeof(Camera) + candidates * (sizeof(DrawCommand) + sizeof(Bounds));
-  const ImageDescription depth{
-      .format = PixelFormat::kD32, .width = kScreen.x, .height = kScreen.y};
-  const ImageDescription pyramid{.format = PixelFormat::kR32f,
-                                 .width = kScreen.x / 2,
-                                 .height = kScreen.y / 2,
-                                 .mips = fullMipCount(kScreen.x / 2, kScreen.y / 2)};
-  countTally(state, candidates,
-             timeKernel(state, kernel,
-                        {.inputs = {{"camera", bytesOf(c.world.camera)},
-                                    {"bounds", std::as_bytes(std::span(c.world.bounds))},
-                                    {"survivors", std::as_bytes(std::span(c.survivors))},
-                                    {"found", bytesOf(found)}},
-                         .outputs = {{"draws", candidates, /*list=*/true}, {"tally", 1}},
-                         .scratch = {{"scratch", scratchOf(candidates)}},
-                         .inputImages = {{"depth", depth, std::as_bytes(std::span(c.depth))},
-                                         {"pyramid", pyramid, std::as_bytes(std::span(c.mips))}},
-                         .push = bytesOf(push),
-                         .extent = {candidates}},
-                        bytes));
+  timeCandidates(state, kernel, c, c.survivors);
+}
+
+void timeOcclusionOfAll(benchmark::State& state, const std::string& kernel, const Case& c) {
+  timeCandidates(state, kernel, c, c.world.commands);
 }
 
 }  // namespace gnomon::culling

@@ -35,6 +35,12 @@ const Case& caseOf(WorldKind kind, std::size_t objects, std::uint64_t seed);
 void timeFrustum(benchmark::State& state, const std::string& kernel, const Case& c);
 void timeOcclusion(benchmark::State& state, const std::string& kernel, const Case& c);
 
+/// culling/hiz on the depth buffer.
+void timeHiz(benchmark::State& state, const std::string& kernel, const Case& c);
+
+/// The same with every object a candidate, whatever the frustum says of it.
+void timeOcclusionOfAll(benchmark::State& state, const std::string& kernel, const Case& c);
+
 /// Counters draws_before, draws_after, survivors (the same, by its usual name) and the share that
 /// is culled.
 void countDraws(benchmark::State& state, std::size_t before, std::size_t after);

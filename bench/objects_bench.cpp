@@ -35,11 +35,13 @@ std::vector<Entry> entries() {
   const auto cpu = [](CullMode mode) {
     return [mode](benchmark::State& state, const Case& c) { onCpu(state, c, mode); };
   };
-  return {{"cpu_none", cpu(CullMode::kNone)},
-          {"cpu_frustum", cpu(CullMode::kFrustum)},
-          {"cpu_bvh", cpu(CullMode::kBvh)},
-          {"frustum", [](auto& s, const Case& c) { timeFrustum(s, "culling/frustum", c); }},
-          {"occlusion", [](auto& s, const Case& c) { timeOcclusion(s, "culling/occlusion", c); }}};
+  const auto gpu = [](auto timer, const char* kernel) {
+    return [=](benchmark::State& state, const Case& c) { timer(state, kernel, c); };
+  };
+  return {
+      {"cpu_none", cpu(CullMode::kNone)},   {"cpu_frustum", cpu(CullMode::kFrustum)},
+      {"cpu_bvh", cpu(CullMode::kBvh)},     {"frustum", gpu(timeFrustum, "culling/frustum")},
+      {"hiz", gpu(timeHiz, "culling/hiz")}, {"occlusion", gpu(timeOcclusion, "culling/occlusion")}};
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "bench/scaling.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <sstream>
 #include <vector>
@@ -91,8 +90,8 @@ std::vector<std::string> rowOf(const Curve& curve) {
 }
 
 std::string countTick(double value) {
-  return value >= 1 ? grouped(static_cast<std::size_t>(std::lround(value)))
-                    : fmt::format("{:g}", value);
+  if (value >= 0.999e6) return fmt::format("{:.0f}M", value * 1e-6);
+  return value >= 0.999e3 ? fmt::format("{:.0f}k", value * 1e-3) : fmt::format("{:g}", value);
 }
 
 std::string timeTick(double seconds) {

@@ -45,6 +45,7 @@ Written timeKernel(benchmark::State& state, const std::string& kernel, const Sti
     resources.upload();
     // The first run pays for what the driver does once.
     Written written = named(resources, resources.run(subject.plain(), 0));
+    Stopwatch::current().wake();
     for (auto _ : state)
       state.SetIterationTime(
           leastOf(kRuns, [&] { return Stopwatch::current().cold(resources, subject.plain()); }));

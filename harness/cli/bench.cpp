@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <regex>
 #include <set>
 
@@ -60,6 +61,18 @@ class Reporter : public benchmark::BenchmarkReporter {
   std::vector<Outcome> outcomes;
 };
 
+/// Leaves out counters that JSON has no number for: the coefficient of variation of what is always
+/// 0 is NaN.
+class FiniteJson : public benchmark::JSONReporter {
+ public:
+  void ReportRuns(const std::vector<Run>& runs) override {
+    std::vector<Run> finite = runs;
+    for (Run& run : finite)
+      std::erase_if(run.counters, [](const auto& c) { return !std::isfinite(c.second.value); });
+    JSONReporter::ReportRuns(finite);
+  }
+};
+
 Times timesOf(const std::vector<Outcome>& outcomes) {
   Times times;
   for (const Outcome& o : outcomes) times[o.name] = o.seconds * 1e9;
@@ -115,7 +128,8 @@ void runBenchmarks(const std::string& filter, const std::string& json, Reporter&
   for (std::string& w : words) argv.push_back(w.data());
   int argc = static_cast<int>(argv.size());
   benchmark::Initialize(&argc, argv.data());
-  benchmark::RunSpecifiedBenchmarks(&reporter);
+  FiniteJson file;
+  benchmark::RunSpecifiedBenchmarks(&reporter, json.empty() ? nullptr : &file);
 }
 
 }  // namespace
