@@ -41,8 +41,9 @@ void store(uint level, uvec2 at, uint bits) {
   switch (level) {
     STORE(0)
     STORE(1)
-    STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11)
-        STORE(12) STORE(13) STORE(14)
+    STORE(2)
+    STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11) STORE(12)
+        STORE(13) STORE(14)
   }
 }
 
@@ -80,6 +81,45 @@ uint laterStep(uvec2 begin, uvec2 end, uint step) {
   return farthest;
 }
 
+uint least(uint a, uint b, uint c, uint d) { return min(min(a, b), min(c, d)); }
+
+uint depthAt(uvec2 at) { return depthBits(texelFetch(depth, ivec2(at), 0).r); }
+
+// A texel of level 1 that covers 2 x 2 pixels.
+uint quad(uvec2 at) {
+  const uvec2 first = 2u * at;
+  const uint texel = least(depthAt(first), depthAt(first + uvec2(1, 0)),
+                           depthAt(first + uvec2(0, 1)), depthAt(first + 1u));
+  store(1u, at, texel);
+  return texel;
+}
+
+// The same for a tile of the depth buffer that takes no rest: every thread has 4 x 4 pixels, whose
+// loads overlap, and nothing has to be divided.
+void reduceWholeTile(uvec2 tile) {
+  const uint side = 1u << (kHizTile - 2u);
+  const uvec2 local = uvec2(gl_LocalInvocationIndex % side, gl_LocalInvocationIndex / side);
+  const uvec2 at = tile * side + local;
+  const uint texel = least(quad(2u * at), quad(2u * at + uvec2(1, 0)), quad(2u * at + uvec2(0, 1)),
+                           quad(2u * at + 1u));
+  store(2u, at, texel);
+  tileTexels[gl_LocalInvocationIndex] = texel;
+  for (uint level = 3u; level <= kHizTile; ++level) {
+    barrier();
+    const uint texels = 1u << (kHizTile - level), apart = 1u << (level - 3u);
+    if (gl_LocalInvocationIndex < texels * texels) {
+      const uvec2 mine = uvec2(gl_LocalInvocationIndex % texels, gl_LocalInvocationIndex / texels);
+      const uint first = (mine.y * side + mine.x) * 2u * apart;
+      const uint lower =
+          least(tileTexels[first], tileTexels[first + apart], tileTexels[first + side * apart],
+                tileTexels[first + side * apart + apart]);
+      store(level, tile * texels + mine, lower);
+      tileTexels[first] = lower;
+    }
+  }
+  if (gl_LocalInvocationIndex == 0u) scratch[placeOf(kHizTile, tile)] = tileTexels[0];
+}
+
 // Levels base + 1 to base + kHizTile of one tile, the last of them into scratch.
 void reduceTile(uint base, uvec2 tile) {
   for (uint step = 1u; step <= kHizTile; ++step) {
@@ -110,7 +150,11 @@ bool isLastGroup() {
 }
 
 void main() {
-  reduceTile(0u, gl_WorkGroupID.xy);
+  const uvec2 tile = gl_WorkGroupID.xy;
+  if (endOf(tile, kHizTile, kHizTile) == (tile + 1u) << kHizTile)
+    reduceWholeTile(tile);
+  else
+    reduceTile(0u, tile);
   if (!isLastGroup()) return;
   for (uint base = kHizTile; base < lastLevel(); base += kHizTile) {
     const uvec2 tiles = sizeOf(base + kHizTile);
