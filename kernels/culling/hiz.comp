@@ -41,8 +41,9 @@ void store(uint level, uvec2 at, uint bits) {
   switch (level) {
     STORE(0)
     STORE(1)
-    STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11)
-        STORE(12) STORE(13) STORE(14)
+    STORE(2)
+    STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11) STORE(12)
+        STORE(13) STORE(14)
   }
 }
 
@@ -80,7 +81,8 @@ uint laterStep(uvec2 begin, uvec2 end, uint step) {
   return farthest;
 }
 
-// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch.
+// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch where another round
+// goes on from it.
 void reduceTile(uint base, uvec2 tile) {
   for (uint step = 1u; step <= kHizTile; ++step) {
     barrier();
@@ -95,7 +97,8 @@ void reduceTile(uint base, uvec2 tile) {
       tileTexels[(local.y * kPitch + local.x) << (step - 1u)] = texel;
     }
   }
-  if (gl_LocalInvocationIndex == 0u) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
+  if (gl_LocalInvocationIndex == 0u && base + kHizTile < lastLevel())
+    scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
 }
 
 // Whether all other groups have written their texels of level kHizTile.
@@ -116,8 +119,7 @@ void main() {
     const uvec2 tiles = sizeOf(base + kHizTile);
     for (uint y = 0u; y < tiles.y; ++y)
       for (uint x = 0u; x < tiles.x; ++x) reduceTile(base, uvec2(x, y));
-    memoryBarrierBuffer();  // the next round reads what thread 0 has written
-    barrier();
+    memoryBarrierBuffer();  // the next round, behind its barrier, reads what thread 0 has written
   }
   const uvec2 groups = sizeOf(kHizTile);
   for (uint i = gl_LocalInvocationIndex; i <= groups.x * groups.y; i += kHizGroup) scratch[i] = 0u;
