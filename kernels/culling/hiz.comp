@@ -34,17 +34,13 @@ uvec2 endOf(uvec2 at, uint level, uint steps) {
 void store(uint level, uvec2 at, uint bits) {
   if (level > lastLevel()) return;
   const vec4 texel = vec4(uintBitsToFloat(bits));
-#define STORE(m)                             \
-  case m + 1:                                \
-    imageStore(levels[m], ivec2(at), texel); \
-    break;
+  // clang-format off
+#define STORE(m) case m + 1: imageStore(levels[m], ivec2(at), texel); break;
   switch (level) {
-    STORE(0)
-    STORE(1)
-    STORE(2)
-    STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11) STORE(12)
-        STORE(13) STORE(14)
+    STORE(0) STORE(1) STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7)
+    STORE(8) STORE(9) STORE(10) STORE(11) STORE(12) STORE(13) STORE(14)
   }
+  // clang-format on
 }
 
 // A texel of a level from kHizTile on stands in scratch where the first texel of level kHizTile
