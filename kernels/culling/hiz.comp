@@ -34,17 +34,13 @@ uvec2 endOf(uvec2 at, uint level, uint steps) {
 void store(uint level, uvec2 at, uint bits) {
   if (level > lastLevel()) return;
   const vec4 texel = vec4(uintBitsToFloat(bits));
-#define STORE(m)                             \
-  case m + 1:                                \
-    imageStore(levels[m], ivec2(at), texel); \
-    break;
+  // clang-format off
+#define STORE(m) case m + 1: imageStore(levels[m], ivec2(at), texel); break;
   switch (level) {
-    STORE(0)
-    STORE(1)
-    STORE(2)
-    STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11) STORE(12)
-        STORE(13) STORE(14)
+    STORE(0) STORE(1) STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7)
+    STORE(8) STORE(9) STORE(10) STORE(11) STORE(12) STORE(13) STORE(14)
   }
+  // clang-format on
 }
 
 // A texel of a level from kHizTile on stands in scratch where the first texel of level kHizTile
@@ -120,7 +116,8 @@ void reduceWholeTile(uvec2 tile) {
   if (gl_LocalInvocationIndex == 0u) scratch[placeOf(kHizTile, tile)] = tileTexels[0];
 }
 
-// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch.
+// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch where another round
+// goes on from it.
 void reduceTile(uint base, uvec2 tile) {
   for (uint step = 1u; step <= kHizTile; ++step) {
     barrier();
@@ -135,7 +132,8 @@ void reduceTile(uint base, uvec2 tile) {
       tileTexels[(local.y * kPitch + local.x) << (step - 1u)] = texel;
     }
   }
-  if (gl_LocalInvocationIndex == 0u) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
+  if (gl_LocalInvocationIndex == 0u && base + kHizTile < lastLevel())
+    scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
 }
 
 // Whether all other groups have written their texels of level kHizTile.
@@ -160,8 +158,7 @@ void main() {
     const uvec2 tiles = sizeOf(base + kHizTile);
     for (uint y = 0u; y < tiles.y; ++y)
       for (uint x = 0u; x < tiles.x; ++x) reduceTile(base, uvec2(x, y));
-    memoryBarrierBuffer();  // the next round reads what thread 0 has written
-    barrier();
+    memoryBarrierBuffer();  // the next round, behind its barrier, reads what thread 0 has written
   }
   const uvec2 groups = sizeOf(kHizTile);
   for (uint i = gl_LocalInvocationIndex; i <= groups.x * groups.y; i += kHizGroup) scratch[i] = 0u;
