@@ -18,6 +18,8 @@ shared uint recounted;
 shared uint done;  // threads
 shared bool isLastGroup;
 
+const uint kRounds = kBlock / kGroupSize;
+
 bool isVisible(uint candidate);
 void list(uint candidate, uint position);
 
@@ -53,12 +55,15 @@ void takeBlock(uint lane) {
 
 void markVisible(uint lane, uint first, uint candidates) {
   const uint inBlock = min(kBlock, candidates - first);
-  for (uint i = lane; i < inBlock; i += kGroupSize)
-    if (isVisible(first + i)) atomicOr(visible[i / 32], 1u << i % 32);
+  for (uint round = 0; round < kRounds; ++round) {
+    const uint i = round * kGroupSize + lane;
+    if (i < inBlock && isVisible(first + i)) atomicOr(visible[i / 32], 1u << i % 32);
+  }
   barrier();
 }
 
-/// One thread: there are few words, and the sooner the others hear of it the better.
+/// One thread: there are few words, and the sooner the others hear of it the better. Before anybody
+/// asks, for threads of a subgroup that wait may keep this one from speaking.
 void publish(uint lane, uint block) {
   if (lane == 0) {
     uint count = 0;
@@ -68,6 +73,7 @@ void publish(uint lane, uint block) {
     }
     atomicExchange(scratch[kBlocks + block], count + 1);
   }
+  barrier();
 }
 
 void askOthers(uint lane, uint block, uint candidates, uint patience) {
@@ -83,7 +89,8 @@ void askOthers(uint lane, uint block, uint candidates, uint patience) {
 }
 
 void listBlock(uint lane, uint first, uint capacity) {
-  for (uint i = lane; i < kBlock; i += kGroupSize) {
+  for (uint round = 0; round < kRounds; ++round) {
+    const uint i = round * kGroupSize + lane;
     const uint word = visible[i / 32], bit = 1u << i % 32;
     if ((word & bit) == 0) continue;
     const uint position = visibleBefore + visibleUpTo[i / 32] + bitCount(word & bit - 1);

@@ -77,7 +77,7 @@ struct HizLevel {  // push constants
 const float kSteepest = 1048576.0f;            // 2^20
 const float kMostWorld = 1125899906842624.0f;  // 2^50: its squares are far from overflow
 
-const uint kGroupSize = 64;  // threads of frustum and occlusion
+const uint kGroupSize = 256;  // threads of frustum and occlusion: each has four candidates
 const uint kBlock = 1024;    // candidates that one group counts
 
 // How often a thread asks other groups for their counts in vain, in all, before it counts for

@@ -15,8 +15,8 @@ layout(set = 0, binding = kHizDepth) uniform texture2D depth;
 layout(set = 0, binding = kHizLevels) writeonly uniform image2D levels[kMaxLevels];
 layout(set = 0, binding = kHizScratch, scalar) coherent buffer Scratch { uint scratch[]; };
 
-// A tile has up to 127 texels a side (the last one takes the rest), two levels on up to 31.
-const uint kPitch = (2u << kHizTile) / 4u - 1u;
+// A tile has up to 127 texels a side (the last one takes the rest), and one level on up to 63.
+const uint kPitch = (1u << kHizTile) - 1u;
 shared uint tileTexels[kPitch * kPitch];
 shared bool lastGroup;
 
@@ -40,8 +40,9 @@ void store(uint level, uvec2 at, uint bits) {
     break;
   switch (level) {
     STORE(0)
-    STORE(1) STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10)
-        STORE(11) STORE(12) STORE(13) STORE(14)
+    STORE(1)
+    STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7) STORE(8) STORE(9) STORE(10) STORE(11)
+        STORE(12) STORE(13) STORE(14)
   }
 }
 
@@ -69,42 +70,29 @@ uint firstStep(uint base, uvec2 at) {
   return farthest;
 }
 
-// A texel of level base + 2, and those of base + 1 on the way.
-uint twoSteps(uint base, uvec2 at) {
-  const uvec2 begin = 2u * at, end = endOf(at, base + 2u, 1u);
+// A texel of a later level from those of the one before, which stand as far apart as the first ones
+// that they are made of: only the thread that makes a texel reads what stands in its place.
+uint laterStep(uvec2 begin, uvec2 end, uint step) {
   uint farthest = kBeyondDepth;
   for (uint y = begin.y; y < end.y; ++y)
-    for (uint x = begin.x; x < end.x; ++x) {
-      const uint texel = firstStep(base, uvec2(x, y));
-      store(base + 1u, uvec2(x, y), texel);
-      farthest = min(farthest, texel);
-    }
-  return farthest;
-}
-
-// A texel of base + step from those of the level before, which stand kPitch a row and a power of
-// two apart: each level takes the places of the first texels that it is made of.
-uint laterStep(uvec2 at, uvec2 end, uint step) {
-  uint farthest = kBeyondDepth;
-  for (uint y = 2u * at.y; y < end.y; ++y)
-    for (uint x = 2u * at.x; x < end.x; ++x)
-      farthest = min(farthest, tileTexels[((y * kPitch + x) << (step - 3u))]);
+    for (uint x = begin.x; x < end.x; ++x)
+      farthest = min(farthest, tileTexels[(y * kPitch + x) << (step - 2u)]);
   return farthest;
 }
 
 // Levels base + 1 to base + kHizTile of one tile, the last of them into scratch.
 void reduceTile(uint base, uvec2 tile) {
-  for (uint step = 2u; step <= kHizTile; ++step) {
+  for (uint step = 1u; step <= kHizTile; ++step) {
     barrier();
     const uint up = kHizTile - step;
     const uvec2 begin = tile << up, size = endOf(tile, base + kHizTile, up) - begin;
     for (uint i = gl_LocalInvocationIndex; i < size.x * size.y; i += kHizGroup) {
       const uvec2 local = uvec2(i % size.x, i / size.x), at = begin + local;
-      const uint texel = step == 2u
-                             ? twoSteps(base, at)
-                             : laterStep(local, endOf(at, base + step, 1u) - 2u * begin, step);
+      const uint texel = step == 1u
+                             ? firstStep(base, at)
+                             : laterStep(2u * local, endOf(at, base + step, 1u) - 2u * begin, step);
       store(base + step, at, texel);
-      tileTexels[(local.y * kPitch + local.x) << (step - 2u)] = texel;
+      tileTexels[(local.y * kPitch + local.x) << (step - 1u)] = texel;
     }
   }
   if (gl_LocalInvocationIndex == 0u) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];

@@ -53,7 +53,7 @@ TEST(Mutate, EveryLawAndTruthTestTellsAMutantThatNoOtherDoes) {
   for (const nlohmann::json& c : cases) {
     const std::string name = c["case"], id = alone.value(name, "");
     const std::vector<std::string> only = c["only"];
-    EXPECT_NE(std::ranges::find(only, id), only.end())
+    EXPECT_EQ(std::ranges::count(only, id), 1)
         << name << " does not alone tell '" << id << "', as tests/mutants/alone.json says.\n"
         << "`gnomon list cases --kills --json -` lists under \"only\" what it does; where that is "
            "nothing, strengthen it or merge it with its like";

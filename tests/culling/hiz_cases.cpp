@@ -184,7 +184,7 @@ Observation HizCase::dispatch(const DepthBuffer& depths, Effort effort, PixelFor
                           .outputImages = {{.image = "levels",
                                             .width = shape.size(0).x,
                                             .height = shape.size(0).y,
-                                            .mips = shape.elements()}},
+                                            .mips = std::max(1u, shape.elements())}},
                           .push = std::as_bytes(std::span(&push, 1)),
                           .extent = {depths.size.x, depths.size.y}});
 }

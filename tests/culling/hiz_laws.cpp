@@ -113,6 +113,8 @@ void PyramidCase::loweringADepthRaisesNoTexel() {
 
 // Sides that are powers of two: elsewhere the last texel, which takes the rest, has no mirror.
 void PyramidCase::mirroringMirrorsEveryLevel() {
+  if (lookup() == Lookup::kPreviousPow2)
+    GTEST_SKIP() << "of a texel in the centre of a pixel the next one may count, on one side";
   const uvec2 size(256, 128);
   const DepthBuffer depths = generatedDepths(size, caseSeed());
   const Pyramid pyramid = pyramidOf(depths);

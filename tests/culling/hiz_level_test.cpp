@@ -49,6 +49,8 @@ TEST_F(CullingHizLevel, ADepthBufferIsReadAsItIs) {
 }
 
 TEST_F(CullingHizLevel, TexelsBeyondTheSizeAreNotTouched) {
+  if (lookup() == Lookup::kPreviousPow2)
+    GTEST_SKIP() << "the size of its first level follows from the image alone";
   for (const uvec2 size : {uvec2(2 * kHizGroupSide + 5, 7), uvec2(7, 2 * kHizGroupSide + 5)}) {
     const DepthBuffer depths = generatedDepths(size, caseSeed());
     expectClean(dispatch(depths, shapeOf(size).size(0), Effort::kWatched, PixelFormat::kR32f,

@@ -52,6 +52,18 @@ TEST_F(CullingHiz, BadDepthsCountAsTheContractSays) {
   expectNoNegativeZeros(dispatch(depths), "levels");
 }
 
+// Hygiene finds the only texel that it is given unwritten, and nothing else.
+TEST_F(CullingHiz, ASinglePixelHasNoLevels) {
+  const DepthBuffer pixel = constantDepths({1, 1}, 0.5f);
+  if (shapeOf(pixel.size).elements() > 0) GTEST_SKIP() << "another pyramid may have one";
+  const Observation seen = dispatch(pixel);
+  for (const std::string& finding : seen.findings)
+    EXPECT_NE(finding.find("left 1 of 1 words of 'levels' unwritten"), std::string::npos)
+        << finding;
+  EXPECT_FALSE(seen.findings.empty());
+  checked(1);
+}
+
 TEST_F(CullingHiz, ADepthBufferIsReadAsItIs) {
   const DepthBuffer depths = generatedDepths({65, 33}, caseSeed());
   expectConforms(dispatch(depths, Effort::kWatched, PixelFormat::kD32), modelOfAll(depths));

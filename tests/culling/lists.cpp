@@ -48,11 +48,21 @@ struct Counts {
   auto scalars() { return std::tie(tested, total, listed, overflowed, recounted); }
 };
 
+bool isForeign(const std::string& kernel) {
+  return Session::current().options().kernels.contains(kernel);
+}
+
+Bounded withValue(Bounded x, const Bounded& of) {
+  x.value = of.value;
+  return x;
+}
+
 /// What a tally is made of.
 struct Totals {
   std::size_t candidates = 0;
   uint capacity = 0, patience = 0;
-  uint recounted = 0;  ///< as the kernel says: timing's, where it had patience
+  uint recounted = 0;    ///< as the kernel says: timing's, where it had patience
+  bool foreign = false;  ///< may keep more, and count as it likes
 
   /// Blocks that are counted again where nobody is asked: all before each.
   uint allBlocks() const {
@@ -63,6 +73,7 @@ struct Totals {
 
 /// Blocks that are counted again: all of them without patience, at most all with it.
 uint recountedOf(const Totals& totals) {
+  if (totals.foreign) return totals.recounted;
   return totals.patience == 0 ? totals.allBlocks() : std::min(totals.recounted, totals.allBlocks());
 }
 
@@ -72,6 +83,9 @@ Counts<T> countsOf(const Totals& totals, const Member& member) {
   T total = T(0);
   for (std::size_t i = 0; i < totals.candidates; ++i)
     total = total + member.template operator()<T>(i);
+  if constexpr (std::is_same_v<T, Bounded>)
+    if (totals.foreign)
+      total = withValue(Bounded::between(total.lo, static_cast<double>(totals.candidates)), total);
   const T most = T(totals.capacity);
   return {T(static_cast<uint>(totals.candidates)), total, min(total, most),
           select(total > most, T(1), T(0)), T(recountedOf(totals))};
@@ -82,6 +96,41 @@ Expectation tallyOf(const Totals& totals, Member member) {
   return expectationOf(
       "tally", 1, [=]<class T>(std::size_t) { return countsOf<T>(totals, member); },
       [=](std::size_t) { return fmt::format("    {} candidates\n", totals.candidates); });
+}
+
+/// A kernel of a user's may keep more than ours, since nothing visible is lost by it: what need not
+/// be listed may be.
+void allowMore(Expectation& visible) {
+  visible.bounded = [ours = visible.bounded](std::size_t i, std::span<Bounded> out) {
+    ours(i, out);
+    out[0] = withValue(Bounded::between(out[0].lo, 1), out[0]);
+  };
+}
+
+/// But it has to cull most of what ours does.
+void refuseTheLoose(const Expectation& visible, Observation& seen) {
+  const auto flags = elementsOf<uint>(seen.twin.at("visible"));
+  std::size_t hidden = 0, kept = 0;
+  for (std::size_t i = 0; i < visible.elements; ++i) {
+    double model = 0;
+    visible.plain(i, {&model, 1});
+    hidden += model == 0;
+    kept += model == 0 && flags[i] == 1;
+  }
+  constexpr std::size_t kFew = 64;  // of which a share says little
+  const double loosest = Session::current().policy()["cullingLoosest"];
+  if (hidden < kFew || static_cast<double>(kept) <= loosest * static_cast<double>(hidden)) return;
+  seen.findings.push_back(
+      fmt::format("it keeps {} of {} candidates that the contract culls; at most {} may be kept",
+                  kept, hidden, static_cast<std::size_t>(loosest * static_cast<double>(hidden))));
+}
+
+Trial asJudged(Observation seen, Expectation visible, const std::string& kernel) {
+  if (seen.applies && isForeign(kernel)) {
+    refuseTheLoose(visible, seen);
+    allowMore(visible);
+  }
+  return {std::move(seen), std::move(visible)};
 }
 
 uint recountedBy(const Observation& seen) {
@@ -193,10 +242,12 @@ Trial ListCase::judged(FrustumInput& input) {
                                             : decodeList(record, record.list("visible"),
                                                          std::as_bytes(std::span(input.commands)),
                                                          input.push.capacity, seen);
-  return {std::move(seen), expectationOf(
-                               "visible", decided,
-                               [&input]<class T>(std::size_t i) { return membership<T>(input, i); },
-                               [&input](std::size_t i) { return describe(input.bounds[i]); })};
+  return asJudged(
+      std::move(seen),
+      expectationOf(
+          "visible", decided, [&input]<class T>(std::size_t i) { return membership<T>(input, i); },
+          [&input](std::size_t i) { return describe(input.bounds[i]); }),
+      kernelName);
 }
 
 Trial ListCase::judged(OcclusionInput& input) {
@@ -221,7 +272,7 @@ Trial ListCase::judged(OcclusionInput& input) {
 void ListCase::expectRightTally(FrustumInput input) {
   const Observation seen = judged(input).seen;
   const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience,
-                      recountedBy(seen)};
+                      recountedBy(seen), isForeign(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [&input]<class T>(std::size_t i) { return membership<T>(input, i); }));
 }
@@ -232,7 +283,7 @@ void ListCase::expectRightTally(OcclusionInput input) {
   const auto model =
       std::make_shared<const OcclusionModel>(OcclusionModel{input, given.pyramid, given.survivors});
   const Totals totals{model->survivors.size(), input.push.capacity, input.push.patience,
-                      recountedBy(seen)};
+                      recountedBy(seen), isForeign(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [model]<class T>(std::size_t i) { return model->membership<T>(i); }));
 }
