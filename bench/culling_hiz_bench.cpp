@@ -45,8 +45,8 @@ void oneLevel(benchmark::State& state, const uvec2& size, uint level) {
        .extent = {made.x, made.y}});
 }
 
-void add(const std::string& name, const std::function<void(benchmark::State&)>& timed) {
-  benchmark::RegisterBenchmark(name.c_str(), timed)->Unit(benchmark::kMicrosecond)->UseManualTime();
+void add(const std::string& name, const std::function<void(benchmark::State&)>& run) {
+  timed(benchmark::RegisterBenchmark(name.c_str(), run));
 }
 
 const bool registered = [] {

@@ -112,12 +112,14 @@ std::optional<PowerLaw> fitPowerLaw(std::span<const Sample> samples, double conf
     return std::nullopt;
   const double q = studentQuantile((1 + confidence) / 2, free);
   const double limit = squares + q * q * variance;
+  const double lower = crossing(profile, limit, exponent, kLeastExponent);
+  if (lower <= kLeastExponent) return std::nullopt;
   const Profile::Fit fit = profile.best(exponent);
   const double factor = std::exp(fit.logFactor);
   return PowerLaw{.fixed = factor * fit.ratio,
                   .factor = factor * std::pow(profile.scale(), -exponent),
                   .exponent = exponent,
-                  .lower = crossing(profile, limit, exponent, kLeastExponent),
+                  .lower = lower,
                   .upper = crossing(profile, limit, exponent, kMostExponent)};
 }
 

@@ -26,7 +26,7 @@ struct PowerLaw {
 /// Student's quantile on m - 3 degrees. Where the law is linear that is the usual interval; unlike
 /// that of the linearised law it knows that the fixed cost is no less than 0. Nothing where there
 /// are fewer than kFewestSamples, or where they do not show any growth: a constant fits as well, by
-/// the F test with the same confidence.
+/// the F test with the same confidence, or the interval reaches down to kLeastExponent.
 std::optional<PowerLaw> fitPowerLaw(std::span<const Sample> samples, double confidence);
 
 inline constexpr std::size_t kFewestSamples = 5;  // three parameters, two degrees of freedom

@@ -119,6 +119,12 @@ TEST(PowerLaw, OfAConstantIsNone) {
   EXPECT_GE(none, 170);
 }
 
+TEST(PowerLaw, OfADriftIsNoneWhereItsExponentMayBeTheLeast) {
+  std::vector<Sample> drift;
+  for (double n = 100; n < 2e6; n *= 10) drift.push_back({n, std::pow(n, 0.01)});
+  EXPECT_FALSE(fitPowerLaw(drift, kConfidence));
+}
+
 TEST(PowerLaw, NeedsMoreSamplesThanParameters) {
   Random random(5);
   std::vector<Sample> few = samples(0, 1e-9, 1, 0, random);
