@@ -6,10 +6,10 @@
 
 GNOMON_CONTRACT(scene)
 
-// A camera, as the host rounds it from double (kernels/culling/camera.h). View space is right-handed
-// and looks down -Z; clip space has z in [0, 1], near at 1 and far at 0 (reverse-Z). A plane is
-// (n, d) with n of unit length and pointing inward: p is inside where dot(n, p) + d >= 0. A plane
-// that there is not, as the far one of an infinite projection, is 0.
+// A camera, as the host rounds it from double (kernels/culling/camera.h). View space is
+// right-handed and looks down -Z; clip space has z in [0, 1], near at 1 and far at 0 (reverse-Z). A
+// plane is (n, d) with n of unit length and pointing inward: p is inside where dot(n, p) + d >= 0.
+// A plane that there is not, as the far one of an infinite projection, is 0.
 struct Camera {
   mat4 view;            // world to view; rotation and translation alone
   mat4 projection;      // view to clip: perspective (projection[2][3] == -1) or orthographic (0)

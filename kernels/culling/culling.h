@@ -78,7 +78,7 @@ const float kSteepest = 1048576.0f;            // 2^20
 const float kMostWorld = 1125899906842624.0f;  // 2^50: its squares are far from overflow
 
 const uint kGroupSize = 256;  // threads of frustum and occlusion: each has four candidates
-const uint kBlock = 1024;    // candidates that one group counts
+const uint kBlock = 1024;     // candidates that one group counts
 
 // How often a thread asks other groups for their counts in vain, in all, before it counts for
 // itself; 0 asks nobody. Mesa's llvmpipe ends every loop of a thread that has made 65,535 passes

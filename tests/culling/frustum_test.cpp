@@ -85,7 +85,13 @@ class CullingFrustumSubgroups : public FrustumCase {
   CullingFrustumSubgroups() : FrustumCase("culling/frustum_subgroups") {}
 };
 
-class CullingFrustumLaws : public CullingFrustum {};
+class CullingFrustumLaws : public CullingFrustum {
+ protected:
+  void SetUp() override {
+    CullingFrustum::SetUp();
+    widthDoesNotMatter();
+  }
+};
 
 TEST_F(CullingFrustum, EverySizeAroundABlockIsListed) { everySizeAroundABlockIsListed(); }
 TEST_F(CullingFrustumSubgroups, EverySizeAroundABlockIsListed) { everySizeAroundABlockIsListed(); }

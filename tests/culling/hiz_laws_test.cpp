@@ -8,7 +8,13 @@
 namespace gnomon::culling {
 namespace {
 
-class CullingHizLaws : public HizCase {};
+class CullingHizLaws : public HizCase {
+ protected:
+  void SetUp() override {
+    HizCase::SetUp();
+    widthDoesNotMatter();
+  }
+};
 class CullingHizLevelLaws : public HizLevelCase {};
 
 TEST_F(CullingHizLaws, AConstantStaysConstant) { aConstantStaysConstant(); }

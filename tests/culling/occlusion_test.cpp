@@ -105,7 +105,13 @@ class CullingOcclusionSubgroups : public OcclusionCase {
   CullingOcclusionSubgroups() : OcclusionCase("culling/occlusion_subgroups") {}
 };
 
-class CullingOcclusionLaws : public CullingOcclusion {};
+class CullingOcclusionLaws : public CullingOcclusion {
+ protected:
+  void SetUp() override {
+    CullingOcclusion::SetUp();
+    widthDoesNotMatter();
+  }
+};
 
 TEST_F(CullingOcclusion, EverySizeAroundABlockIsListed) { everySizeAroundABlockIsListed(); }
 TEST_F(CullingOcclusionSubgroups, EverySizeAroundABlockIsListed) {
