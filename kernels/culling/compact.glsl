@@ -11,14 +11,13 @@
 // come to the same answer wherever a compiler inlines it, so its arithmetic is `precise`.
 
 shared uint blockOfGroup;
-shared uint visible[kBlock / 32];      // a bit a candidate
-shared uint visibleUpTo[kBlock / 32];  // candidates before the first of each word
-shared uint visibleBefore;             // the block
+const uint kWords = kBlock / 32;
+shared uint visible[kWords];          // a bit a candidate
+shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
+shared uint visibleBefore;            // the block
 shared uint recounted;
 shared uint done;  // threads
 shared bool isLastGroup;
-
-const uint kRounds = kBlock / kGroupSize;
 
 bool isVisible(uint candidate);
 void list(uint candidate, uint position);
@@ -49,29 +48,25 @@ void takeBlock(uint lane) {
     done = 0;
     isLastGroup = false;
   }
-  for (uint w = lane; w < kBlock / 32; w += kGroupSize) visible[w] = 0;
+  for (uint w = lane; w < kWords; w += kGroupSize) visible[w] = 0;
   barrier();
 }
 
 void markVisible(uint lane, uint first, uint candidates) {
   const uint inBlock = min(kBlock, candidates - first);
-  for (uint round = 0; round < kRounds; ++round) {
-    const uint i = round * kGroupSize + lane;
-    if (i < inBlock && isVisible(first + i)) atomicOr(visible[i / 32], 1u << i % 32);
-  }
+  for (uint i = lane; i < inBlock; i += kGroupSize)
+    if (isVisible(first + i)) atomicOr(visible[i / 32], 1u << i % 32);
   barrier();
 }
 
-/// One thread: there are few words, and the sooner the others hear of it the better. Before anybody
-/// asks, for threads of a subgroup that wait may keep this one from speaking.
+/// Says how many there are before anybody asks, for threads of a subgroup that wait may keep others
+/// from speaking.
 void publish(uint lane, uint block) {
-  if (lane == 0) {
-    uint count = 0;
-    for (uint w = 0; w < kBlock / 32; ++w) {
-      visibleUpTo[w] = count;
-      count += bitCount(visible[w]);
-    }
-    atomicExchange(scratch[kBlocks + block], count + 1);
+  if (lane <= kWords) {
+    uint before = 0;
+    for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
+    visibleUpTo[lane] = before;
+    if (lane == kWords) atomicExchange(scratch[kBlocks + block], before + 1);
   }
   barrier();
 }
@@ -89,8 +84,7 @@ void askOthers(uint lane, uint block, uint candidates, uint patience) {
 }
 
 void listBlock(uint lane, uint first, uint capacity) {
-  for (uint round = 0; round < kRounds; ++round) {
-    const uint i = round * kGroupSize + lane;
+  for (uint i = lane; i < kBlock; i += kGroupSize) {
     const uint word = visible[i / 32], bit = 1u << i % 32;
     if ((word & bit) == 0) continue;
     const uint position = visibleBefore + visibleUpTo[i / 32] + bitCount(word & bit - 1);
@@ -133,9 +127,8 @@ void compact(uint candidates, uint capacity, uint patience) {
     publish(lane, block);
     askOthers(lane, block, candidates, patience);
     listBlock(lane, first, capacity);
-    const uint count = visibleUpTo[kBlock / 32 - 1] + bitCount(visible[kBlock / 32 - 1]);
     if (lane == 0 && block == blocksOf(candidates) - 1)
-      atomicExchange(scratch[kTotal], visibleBefore + count);
+      atomicExchange(scratch[kTotal], visibleBefore + visibleUpTo[kWords]);
   }
   finish(lane, candidates, capacity);
 }

@@ -6,6 +6,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_shader_image_load_formatted : require
+#extension GL_EXT_control_flow_attributes : require
 #include "culling.h"
 #include "hiz.glsl"
 
@@ -100,7 +101,7 @@ void reduceWholeTile(uvec2 tile) {
                            quad(2u * at + 1u));
   store(2u, at, texel);
   tileTexels[gl_LocalInvocationIndex] = texel;
-  for (uint level = 3u; level <= kHizTile; ++level) {
+  [[dont_unroll]] for (uint level = 3u; level <= kHizTile; ++level) {
     barrier();
     const uint texels = 1u << (kHizTile - level), apart = 1u << (level - 3u);
     if (gl_LocalInvocationIndex < texels * texels) {
@@ -119,7 +120,7 @@ void reduceWholeTile(uvec2 tile) {
 // Levels base + 1 to base + kHizTile of one tile, the last of them into scratch where another round
 // goes on from it.
 void reduceTile(uint base, uvec2 tile) {
-  for (uint step = 1u; step <= kHizTile; ++step) {
+  [[dont_unroll]] for (uint step = 1u; step <= kHizTile; ++step) {
     barrier();
     const uint up = kHizTile - step;
     const uvec2 begin = tile << up, size = endOf(tile, base + kHizTile, up) - begin;
@@ -136,6 +137,13 @@ void reduceTile(uint base, uvec2 tile) {
     scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
 }
 
+void reduce(uint base, uvec2 tile) {
+  if (base == 0u && endOf(tile, kHizTile, kHizTile) == (tile + 1u) << kHizTile)
+    reduceWholeTile(tile);
+  else
+    reduceTile(base, tile);
+}
+
 // Whether all other groups have written their texels of level kHizTile.
 bool isLastGroup() {
   if (gl_LocalInvocationIndex == 0u) {
@@ -148,17 +156,14 @@ bool isLastGroup() {
 }
 
 void main() {
-  const uvec2 tile = gl_WorkGroupID.xy;
-  if (endOf(tile, kHizTile, kHizTile) == (tile + 1u) << kHizTile)
-    reduceWholeTile(tile);
-  else
-    reduceTile(0u, tile);
-  if (!isLastGroup()) return;
-  for (uint base = kHizTile; base < lastLevel(); base += kHizTile) {
-    const uvec2 tiles = sizeOf(base + kHizTile);
-    for (uint y = 0u; y < tiles.y; ++y)
-      for (uint x = 0u; x < tiles.x; ++x) reduceTile(base, uvec2(x, y));
+  uvec2 first = gl_WorkGroupID.xy, end = first + 1u;  // tiles of a round
+  for (uint base = 0u; base == 0u || base < lastLevel(); base += kHizTile) {
+    for (uint y = first.y; y < end.y; ++y)
+      for (uint x = first.x; x < end.x; ++x) reduce(base, uvec2(x, y));
+    if (base == 0u && !isLastGroup()) return;
     memoryBarrierBuffer();  // the next round, behind its barrier, reads what thread 0 has written
+    first = uvec2(0);
+    end = sizeOf(base + 2u * kHizTile);
   }
   const uvec2 groups = sizeOf(kHizTile);
   for (uint i = gl_LocalInvocationIndex; i <= groups.x * groups.y; i += kHizGroup) scratch[i] = 0u;

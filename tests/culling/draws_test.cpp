@@ -72,14 +72,24 @@ struct Frame {
   bool operator==(const Frame&) const = default;
 };
 
+/// Writes an object's number where it is nearest.
+DrawProgramDescription drawing() {
+  return {.vertex = compileText("ids.vert", kVertex, {}),
+          .fragment = compileText("ids.frag", kFragment, {}),
+          .slots = {buffer(0)},
+          .pushBytes = sizeof(mat4),
+          .colours = {PixelFormat::kR32ui},
+          .depth = true};
+}
+
 /// A scene on the device with what culls and draws it.
 class Stage {
  public:
-  Stage(Gpu& g, const Scene& s)
+  Stage(Gpu& g, const GpuDrawProgram& p, const Scene& s)
       : gpu(g),
         scene(s),
         objects(static_cast<uint>(s.things.size())),
-        program(gpu.build(drawing())),
+        program(p),
         transforms(uploaded(gpu, placed(s))),
         indices(uploaded(gpu, std::vector<uint>(kCube.begin(), kCube.end()))),
         camera(uploaded(gpu, std::vector{s.camera})),
@@ -147,21 +157,12 @@ class Stage {
   Gpu& gpu;
   const Scene& scene;
   uint objects;
-  GpuDrawProgram program;
+  const GpuDrawProgram& program;
   GpuBuffer transforms, indices, camera, bounds, commands, survivors, found, draws, tally, scratch,
       hizScratch;
   GpuImage ids, depth, pyramid;
 
  private:
-  static DrawProgramDescription drawing() {
-    return {.vertex = compileText("ids.vert", kVertex, {}),
-            .fragment = compileText("ids.frag", kFragment, {}),
-            .slots = {buffer(0)},
-            .pushBytes = sizeof(mat4),
-            .colours = {PixelFormat::kR32ui},
-            .depth = true};
-  }
-
   static std::vector<mat4> placed(const Scene& scene) {
     std::vector<mat4> all;
     for (const Thing& thing : scene.things) all.emplace_back(thing.transform);
@@ -243,11 +244,12 @@ class CullingOcclusionDraws : public ListCase {
   template <class F>
   void forScenes(const F& f) {
     skipWhereUnsupported([&] {
+      const GpuDrawProgram program = Session::current().gpu().build(drawing());
       std::size_t culled = 0, kept = 0;
       for (int kind = 0; kind < kSceneKinds; ++kind)
         for (std::uint64_t s = 0; s < 3; ++s) {
           const Scene scene = cubes(static_cast<SceneKind>(kind), caseSeed() + s);
-          Stage stage(Session::current().gpu(), scene);
+          Stage stage(Session::current().gpu(), program, scene);
           stage.cull();
           const std::size_t listed = stage.listed().size();
           kept += listed;
@@ -296,7 +298,8 @@ TEST_F(CullingOcclusionDraws, TalliesComeBackInOrderWithoutAWait) {
   skipWhereUnsupported([&] {
     const Scene scene = cubes(SceneKind::kField, caseSeed());
     Gpu& gpu = Session::current().gpu();
-    Stage stage(gpu, scene);
+    const GpuDrawProgram program = gpu.build(drawing());
+    Stage stage(gpu, program, scene);
     GpuReadback readback(gpu, 3, sizeof(Tally));
     const GpuCopy wanted{.from = &stage.found, .bytes = sizeof(Tally)};
     std::uint64_t submitted = 0, read = 0;

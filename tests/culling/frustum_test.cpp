@@ -35,6 +35,7 @@ class FrustumCase : public ListCase {
   using ListCase::ListCase;
 
   void everySizeAroundABlockIsListed() {
+    widthDoesNotMatter();
     for (const std::size_t n :
          {std::size_t{0}, std::size_t{1}, std::size_t{kGroupSize - 1}, std::size_t{kGroupSize},
           std::size_t{kBlock - 1}, std::size_t{kBlock}, std::size_t{kBlock + 1},
@@ -106,8 +107,14 @@ TEST_F(CullingFrustumSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
 }
 
-TEST_F(CullingFrustum, GroupsThatAskAreAnswered) { groupsThatAskAreAnswered(); }
-TEST_F(CullingFrustumSubgroups, GroupsThatAskAreAnswered) { groupsThatAskAreAnswered(); }
+TEST_F(CullingFrustum, GroupsThatAskAreAnswered) {
+  widthDoesNotMatter();
+  groupsThatAskAreAnswered();
+}
+TEST_F(CullingFrustumSubgroups, GroupsThatAskAreAnswered) {
+  widthDoesNotMatter();
+  groupsThatAskAreAnswered();
+}
 
 TEST_F(CullingFrustum, ManySpheresAreListedAsTheModelSays) { manySpheresAreListedAsTheModelSays(); }
 TEST_F(CullingFrustumSubgroups, ManySpheresAreListedAsTheModelSays) {
@@ -133,6 +140,7 @@ TEST_F(CullingFrustum, TouchingAPlaneIsVisible) {
 
 // One world unit before the near plane, and behind the far one.
 TEST_F(CullingFrustum, CastersBeforeTheNearPlaneCountWhereAskedFor) {
+  widthDoesNotMatter();
   const std::vector<Bounds> all = {
       {{0, 0, 3}, 1}, {{0, 0, -5}, 1}, {{0, 0, -12}, 1}, {{9, 0, 3}, 1}, {{0, 0, 300}, 1}};
   for (const uint off : {0u, 1u, 7u}) {

@@ -14,12 +14,20 @@ class CullingHiz : public HizCase {};
 constexpr uint kTile = 1u << kHizTile;
 
 TEST_F(CullingHiz, EverySizeIsExact) {
+  widthDoesNotMatter();
   for (const uvec2 size : {uvec2(1, 2), uvec2(1, 7), uvec2(3, 5), uvec2(17, 9), uvec2(31, 62)})
+    expectEveryTexel(generatedDepths(size, caseSeed() + size.x));
+}
+
+// Whole tiles, tiles with a rest, and a last group with work for all of its threads.
+TEST_F(CullingHiz, SubgroupsOfEveryWidthMakeTheSamePyramid) {
+  for (const uvec2 size : {uvec2(3 * kTile + 1, 2 * kTile + 5), uvec2(8256, 3)})
     expectEveryTexel(generatedDepths(size, caseSeed() + size.x));
 }
 
 // One tile or two, the last of which takes the rest of its row or column.
 TEST_F(CullingHiz, EverySizeAroundATileIsExact) {
+  widthDoesNotMatter();
   for (const uvec2 size :
        {uvec2(kTile - 1, kTile), uvec2(kTile), uvec2(kTile + 1, 2 * kTile - 1), uvec2(2 * kTile, 1),
         uvec2(2 * kTile - 1), uvec2(2 * kTile + 1, 3 * kTile - 1)})
@@ -29,6 +37,7 @@ TEST_F(CullingHiz, EverySizeAroundATileIsExact) {
 // More tiles than one tile has texels: 129 and 192 a row, and 127, which one more tile takes.
 // The last group has work for all of its threads there, so that the order of them shows.
 TEST_F(CullingHiz, LevelsAboveTheSecondTileAreExact) {
+  widthDoesNotMatter();
   for (const uvec2 size : {uvec2(8256, 3), uvec2(3, 12351), uvec2(16384, 1)})
     expectEveryTexel(generatedDepths(size, caseSeed() + size.x));
   expectEveryTexelAtOnce(generatedDepths({8128, 65}, caseSeed()));
@@ -59,6 +68,7 @@ TEST_F(CullingHiz, BadDepthsCountAsTheContractSays) {
 
 // Hygiene finds the only texel that it is given unwritten, and nothing else.
 TEST_F(CullingHiz, ASinglePixelHasNoLevels) {
+  widthDoesNotMatter();
   const DepthBuffer pixel = constantDepths({1, 1}, 0.5f);
   if (shapeOf(pixel.size).elements() > 0) GTEST_SKIP() << "another pyramid may have one";
   const Observation seen = dispatch(pixel);

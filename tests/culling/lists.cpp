@@ -61,7 +61,7 @@ Bounded withValue(Bounded x, const Bounded& of) {
 struct Totals {
   std::size_t candidates = 0;
   uint capacity = 0, patience = 0;
-  uint recounted = 0;    ///< as the kernel says: timing's, where it had patience
+  Tally said{};          ///< by the kernel
   bool foreign = false;  ///< may keep more, and count as it likes
 
   /// Blocks that are counted again where nobody is asked: all before each.
@@ -71,10 +71,14 @@ struct Totals {
   }
 };
 
+double leastOf(double x) { return x; }
+double leastOf(const Bounded& x) { return x.lo; }
+
 /// Blocks that are counted again: all of them without patience, at most all with it.
 uint recountedOf(const Totals& totals) {
-  if (totals.foreign) return totals.recounted;
-  return totals.patience == 0 ? totals.allBlocks() : std::min(totals.recounted, totals.allBlocks());
+  const uint said = totals.said.recounted, all = totals.allBlocks();
+  if (totals.foreign) return said;
+  return totals.patience == 0 ? all : std::min(said, all);  // timing's, where there was patience
 }
 
 /// `member` says of one candidate whether it is visible, 1 or 0; of bounds both.
@@ -83,9 +87,7 @@ Counts<T> countsOf(const Totals& totals, const Member& member) {
   T total = T(0);
   for (std::size_t i = 0; i < totals.candidates; ++i)
     total = total + member.template operator()<T>(i);
-  if constexpr (std::is_same_v<T, Bounded>)
-    if (totals.foreign)
-      total = withValue(Bounded::between(total.lo, static_cast<double>(totals.candidates)), total);
+  if (totals.foreign) total = T(std::max(totals.said.total, static_cast<uint>(leastOf(total))));
   const T most = T(totals.capacity);
   return {T(static_cast<uint>(totals.candidates)), total, min(total, most),
           select(total > most, T(1), T(0)), T(recountedOf(totals))};
@@ -133,8 +135,8 @@ Trial asJudged(Observation seen, Expectation visible, const std::string& kernel)
   return {std::move(seen), std::move(visible)};
 }
 
-uint recountedBy(const Observation& seen) {
-  return seen.applies ? elementsOf<Tally>(seen.twin.at("tally"))[0].recounted : 0;
+Tally tallyBy(const Observation& seen) {
+  return seen.applies ? elementsOf<Tally>(seen.twin.at("tally"))[0] : Tally{};
 }
 
 /// The levels from the first on, as an image has them; one texel where there are none.
@@ -271,8 +273,8 @@ Trial ListCase::judged(OcclusionInput& input) {
 
 void ListCase::expectRightTally(FrustumInput input) {
   const Observation seen = judged(input).seen;
-  const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience,
-                      recountedBy(seen), isForeign(kernelName)};
+  const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience, tallyBy(seen),
+                      isForeign(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [&input]<class T>(std::size_t i) { return membership<T>(input, i); }));
 }
@@ -283,7 +285,7 @@ void ListCase::expectRightTally(OcclusionInput input) {
   const auto model =
       std::make_shared<const OcclusionModel>(OcclusionModel{input, given.pyramid, given.survivors});
   const Totals totals{model->survivors.size(), input.push.capacity, input.push.patience,
-                      recountedBy(seen), isForeign(kernelName)};
+                      tallyBy(seen), isForeign(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [model]<class T>(std::size_t i) { return model->membership<T>(i); }));
 }
