@@ -97,8 +97,11 @@ class Inquiry {
   }
 
   void makeMutants() {
-    const KernelModule module = moduleOf(schedule.session, findKernel(question.kernel));
-    MutantSet found = mutantsOf(module.words, question.operators);
+    const KernelRecord& record = findKernel(question.kernel);
+    const bool foreign = schedule.session.kernels.contains(question.kernel);
+    const KernelModule module = moduleOf(schedule.session, record);
+    MutantSet found = mutantsOf(module.words, question.operators,
+                                foreign ? std::vector<std::string>{} : record.ownCode);
     answer.mutants = std::move(found.mutants);
     answer.equivalent = std::move(found.equivalent);
     answer.invalid = found.invalid;

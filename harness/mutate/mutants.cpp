@@ -54,11 +54,17 @@ std::vector<Form> formsOf(const std::vector<Mutant>& mutants) {
 
 }  // namespace
 
-MutantSet mutantsOf(std::span<const std::uint32_t> module, const std::set<std::string>& operators) {
+MutantSet mutantsOf(std::span<const std::uint32_t> module, const std::set<std::string>& operators,
+                    const std::vector<std::string>& parts) {
+  const auto isPart = [&](const std::string& id) {
+    return parts.empty() ||
+           std::ranges::any_of(parts, [&](const std::string& p) { return id.starts_with(p); });
+  };
   const ModuleView view(module);
   std::vector<Mutant> all;
   forEachEdit(view, [&](Mutant mutant, const Edit& edit) {
     if (!operators.empty() && !operators.contains(mutant.operatorName)) return;
+    if (!isPart(mutant.id)) return;
     mutant.module = edit.applied();
     mutant.hash = hashWithoutDebug(mutant.module);
     all.push_back(std::move(mutant));

@@ -31,9 +31,11 @@ struct MutantSet {
 };
 
 /// Every mutant by these operators (none named: by all) of the code that the module's entry points
-/// reach. Throws UsageError where the module does not parse. Takes about 10 ms a mutant on both of
-/// two cores: spirv-val and spirv-opt run on each.
-MutantSet mutantsOf(std::span<const std::uint32_t> module, const std::set<std::string>& operators);
+/// reach, or of those parts of it whose mutants' ids begin so. Throws UsageError where the module
+/// does not parse. Takes about 10 ms a mutant on both of two cores: spirv-val and spirv-opt run on
+/// each.
+MutantSet mutantsOf(std::span<const std::uint32_t> module, const std::set<std::string>& operators,
+                    const std::vector<std::string>& parts = {});
 
 /// The mutants with these ids alone, not classified. Throws UsageError where one is not among them.
 std::vector<Mutant> mutantsNamed(std::span<const std::uint32_t> module,

@@ -96,12 +96,15 @@ KernelRecord occlusion(std::string entry) {
       "Occlusion", field("size", &Occlusion::size), field("objects", &Occlusion::objects),
       field("candidates", &Occlusion::candidates), field("capacity", &Occlusion::capacity),
       field("pad", &Occlusion::pad), field("patience", &Occlusion::patience));
+  record.ownCode = {"culling/occlusion.glsl"};
   record.summary = "spheres against the pyramid of depths; draws of what is not hidden, compacted";
   return record;
 }
 
-/// The other path to the same contract.
+/// The other path to the same contract. Of its own it has how counts are summed, in both alike.
 KernelRecord withSubgroups(KernelRecord record) {
+  record.ownCode = {"culling/compact.glsl:askOthers"};
+  record.mutates = record.entry == "frustum_subgroups";
   record.features.emplace_back("subgroupArithmetic");
   record.summary = "the same with subgroup operations";
   return record;
