@@ -72,6 +72,7 @@ KernelRecord lister(std::string entry, const char* source, unsigned sourceBindin
                    .overflowed = "overflowed"}};
   record.grid = aGroupForEveryBlock;
   record.features = {"scalarBlockLayout"};
+  record.mutates = false;  // TODO: the campaign takes half an hour; its score is not on record yet
   return record;
 }
 
@@ -104,7 +105,6 @@ KernelRecord occlusion(std::string entry) {
 /// The other path to the same contract. Of its own it has how counts are summed, in both alike.
 KernelRecord withSubgroups(KernelRecord record) {
   record.ownCode = {"culling/compact.glsl:askOthers"};
-  record.mutates = record.entry == "frustum_subgroups";
   record.features.emplace_back("subgroupArithmetic");
   record.summary = "the same with subgroup operations";
   return record;

@@ -85,20 +85,23 @@ uint depthAt(uvec2 at) { return depthBits(texelFetch(depth, ivec2(at), 0).r); }
 // A texel of level 1 that covers 2 x 2 pixels.
 uint quad(uvec2 at) {
   const uvec2 first = 2u * at;
-  const uint texel = least(depthAt(first), depthAt(first + uvec2(1, 0)),
-                           depthAt(first + uvec2(0, 1)), depthAt(first + 1u));
-  store(1u, at, texel);
-  return texel;
+  return least(depthAt(first), depthAt(first + uvec2(1, 0)), depthAt(first + uvec2(0, 1)),
+               depthAt(first + 1u));
 }
 
-// The same for a tile of the depth buffer that takes no rest: every thread has 4 x 4 pixels, whose
-// loads overlap, and nothing has to be divided.
+// The same for a tile of the depth buffer that takes no rest: every thread has 4 x 4 pixels, all
+// loaded before the first is stored, and nothing has to be divided.
 void reduceWholeTile(uvec2 tile) {
   const uint side = 1u << (kHizTile - 2u);
   const uvec2 local = uvec2(gl_LocalInvocationIndex % side, gl_LocalInvocationIndex / side);
-  const uvec2 at = tile * side + local;
-  const uint texel = least(quad(2u * at), quad(2u * at + uvec2(1, 0)), quad(2u * at + uvec2(0, 1)),
-                           quad(2u * at + 1u));
+  const uvec2 at = tile * side + local, first = 2u * at;
+  const uvec2 right = first + uvec2(1, 0), below = first + uvec2(0, 1), both = first + 1u;
+  const uint a = quad(first), b = quad(right), c = quad(below), d = quad(both);
+  const uint texel = least(a, b, c, d);
+  store(1u, first, a);
+  store(1u, right, b);
+  store(1u, below, c);
+  store(1u, both, d);
   store(2u, at, texel);
   tileTexels[gl_LocalInvocationIndex] = texel;
   [[dont_unroll]] for (uint level = 3u; level <= kHizTile; ++level) {

@@ -5,7 +5,7 @@
 // objects around a block's, and none; groups that ask each other and groups that count again; bad
 // bounds; casters before the near plane; nothing that a ray sees is culled. The path with subgroups
 // repeats what the compaction is about.
-// Not covered: drawing the list (draws_test.cpp), more objects than a few blocks (the benchmarks).
+// Not covered: drawing the list (draws_test.cpp).
 #include <algorithm>
 #include <cmath>
 
@@ -64,6 +64,17 @@ class FrustumCase : public ListCase {
     }
   }
 
+  /// A thread then asks more than one group.
+  void moreBlocksThanThreadsAreListed() {
+    widthDoesNotMatter();
+    const std::size_t n = (kGroupSize + 2) * kBlock + 1;
+    const std::vector<bool> kept = quicklyVisible(frustumInput(box(), everyThird(n)));
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < n; ++i) wrong += kept[i] != (i % 3 == 0);
+    EXPECT_EQ(wrong, 0u) << "of " << n << " objects";
+    checked(n);
+  }
+
   void groupsThatAskAreAnswered() { expectAnswers(frustumInput(box(), everyThird(3 * kBlock))); }
 
   void manySpheresAreListedAsTheModelSays() {
@@ -106,6 +117,11 @@ TEST_F(CullingFrustum, BlocksAreCountedByWhoeverAsksNobody) {
 }
 TEST_F(CullingFrustumSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
+}
+
+TEST_F(CullingFrustum, MoreBlocksThanThreadsAreListed) { moreBlocksThanThreadsAreListed(); }
+TEST_F(CullingFrustumSubgroups, MoreBlocksThanThreadsAreListed) {
+  moreBlocksThanThreadsAreListed();
 }
 
 TEST_F(CullingFrustum, GroupsThatAskAreAnswered) {
