@@ -182,7 +182,7 @@ struct KernelRecord {
   std::vector<std::string> features{};  ///< that the device must have, by GpuInfo::features name
   std::map<std::uint32_t, std::uint32_t> specialization{};  ///< constant id -> 32 bits
   bool deterministic = true;  ///< two runs on the same input agree to the bit
-  bool mutates = true;        ///< false: `gnomon mutate` leaves it out, as it is generated or shared
+  bool mutates = true;  ///< false: `gnomon mutate` leaves it out, as it is generated or shared
   /// Where it shares code with another kernel, under which that is mutated: how ids of its own
   /// mutants begin, "culling/occlusion.glsl". Empty: all of it.
   std::vector<std::string> ownCode{};
