@@ -159,7 +159,8 @@ bool isLastGroup() {
 }
 
 void main() {
-  uvec2 first = gl_WorkGroupID.xy, end = first + 1u;  // tiles of a round
+  // Tiles of a round. Those that take a rest have most to do, so their groups start first.
+  uvec2 first = gl_NumWorkGroups.xy - 1u - gl_WorkGroupID.xy, end = first + 1u;
   for (uint base = 0u; base == 0u || base < lastLevel(); base += kHizTile) {
     for (uint y = first.y; y < end.y; ++y)
       for (uint x = first.x; x < end.x; ++x) reduce(base, uvec2(x, y));
