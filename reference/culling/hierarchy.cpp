@@ -159,9 +159,9 @@ class Builder {
         ++bin.count;
       }
       if (const std::size_t left = cheapestSplit(bins); left > 0) {
-        const auto middle =
-            std::ranges::partition(part, [&](const Item& i) { return binning(i) < left; });
-        return task.first + static_cast<std::uint32_t>(middle.begin() - part.begin());
+        const auto middle = std::partition(part.begin(), part.end(),
+                                           [&](const Item& i) { return binning(i) < left; });
+        return task.first + static_cast<std::uint32_t>(middle - part.begin());
       }
     }
     const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
