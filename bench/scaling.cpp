@@ -73,9 +73,9 @@ std::string counterText(const Outcome& outcome, const char* name, const char* fo
 
 std::vector<std::string> rowOf(const Curve& curve) {
   const auto& [objects, outcome] = curve.points.back();
-  const auto draws = [&](const char* name) {
-    const auto found = outcome->counters.find(name);
-    return found == outcome->counters.end() ? "" : grouped(static_cast<std::size_t>(found->second));
+  const auto draws = [&last = *outcome](const char* name) {
+    const auto found = last.counters.find(name);
+    return found == last.counters.end() ? "" : grouped(static_cast<std::size_t>(found->second));
   };
   return {curve.world,
           curve.entry,

@@ -138,8 +138,9 @@ TEST(CullingOcclusionModel, AQuerySeesItsPixelsAndNotManyMore) {
       return least;
     };
     for (int j = 0; j < 20; ++j) {
-      const std::int64_t a = random.below(size.x), b = random.below(size.x);
-      const std::int64_t c = random.below(size.y), d = random.below(size.y);
+      const auto below = [&](uint side) { return static_cast<std::int64_t>(random.below(side)); };
+      const std::int64_t a = below(size.x), b = below(size.x);
+      const std::int64_t c = below(size.y), d = below(size.y);
       const PixelRect rect{std::min(a, b), std::max(a, b), std::min(c, d), std::max(c, d)};
       const float found = farthestIn(pyramid, rect);
       EXPECT_LE(found, smallestIn(rect.x0, rect.x1, rect.y0, rect.y1));

@@ -94,7 +94,7 @@ struct Made {
 /// A right list of the candidates 2, 3, 5, 7 and 11, of which eight fit.
 Made rightList() {
   Made made;
-  for (const std::size_t c : {2, 3, 5, 7, 11}) made.draws.push_back(candidates()[c]);
+  for (const std::size_t c : {2u, 3u, 5u, 7u, 11u}) made.draws.push_back(candidates()[c]);
   made.stats = {5, 5, 0};
   return made;
 }
