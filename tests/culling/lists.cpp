@@ -214,17 +214,20 @@ OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
   const std::vector<DrawCommand> all = commandsFor(input.bounds.size());
   for (std::size_t i = 0; i < all.size(); i += input.stride) survivors.push_back(all[i]);
   const auto n = static_cast<uint>(survivors.size());
-  input.push.candidates = n;
+  input.push.candidates = n + input.behind;
+  const std::vector<DrawCommand> unfound(input.behind, {36, 1, 0, 0, 0});
+  given = survivors;
+  given.insert(given.end(), unfound.begin(), unfound.end());
   found = {
       {.tested = input.push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0}};
   const uvec2 size = max(input.push.size / 2u, uvec2(1));
   const auto mips = static_cast<unsigned>(std::max<std::size_t>(pyramid.levels.size() - 1, 1));
   stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
                          {"bounds", std::as_bytes(std::span(input.bounds))},
-                         {"survivors", std::as_bytes(std::span(survivors))},
+                         {"survivors", std::as_bytes(std::span(given))},
                          {"found", std::as_bytes(std::span(found))}},
               .outputs = {{"draws", input.push.capacity, /*list=*/true}, {"tally", 1}},
-              .scratch = {{"scratch", kBlocks + blocksOf(n)}},
+              .scratch = {{"scratch", kBlocks + blocksOf(given.size())}},
               .inputImages = {floatImage("depth", input.depth),
                               {.image = "pyramid",
                                .description = {.format = PixelFormat::kR32f,
@@ -233,7 +236,7 @@ OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
                                                .mips = mips},
                                .texels = std::as_bytes(std::span(levels))}},
               .push = std::as_bytes(std::span(&input.push, 1)),
-              .extent = {n}};
+              .extent = {given.size()}};
 }
 
 Trial ListCase::judged(FrustumInput& input) {

@@ -23,13 +23,14 @@ FrustumInput frustumInput(const Camera& camera, std::vector<Bounds> bounds, floa
 void parts(Parts& p, FrustumInput& input);
 bool admits(const FrustumInput& input);
 
-/// What occlusion is given: every `stride`-th object is a survivor of the frustum.
+/// What occlusion is given: every `stride`-th object is a survivor of the frustum. Behind the list
+/// of survivors there may be draws that nobody has found.
 struct OcclusionInput {
   std::vector<Camera> camera{};  ///< one
   std::vector<Bounds> bounds{};
   Picture depth{};
   Occlusion push{{1, 1}, 0, 0, 0, 0, kPatience};
-  uint stride = 1;
+  uint stride = 1, behind = 0;
 };
 
 OcclusionInput occlusionInput(const Camera& camera, std::vector<Bounds> bounds, Picture depth,
@@ -54,6 +55,7 @@ class OcclusionStimulus {
 
  private:
   std::vector<Tally> found;
+  std::vector<DrawCommand> given;  ///< the survivors, and what is behind them
   std::vector<float> levels;
 };
 

@@ -181,6 +181,16 @@ TEST_F(CullingOcclusion, SurvivorsMayBeAnyPartOfTheObjects) {
   }
 }
 
+TEST_F(CullingOcclusion, DrawsBehindTheListAreNotLookedAt) {
+  widthDoesNotMatter();
+  for (const uint behind : {1u, 5u, 2 * kBlock}) {
+    OcclusionInput input = anyInput(100, {61, 43}, caseSeed());
+    input.behind = behind;
+    input.push.capacity = 3 * kBlock;
+    expectRightList(input);
+  }
+}
+
 // Six units of numbers that code treats wrongly, in every place.
 TEST_F(CullingOcclusion, BadBoundsAreVisible) {
   widthDoesNotMatter();
