@@ -265,13 +265,14 @@ Trial ListCase::judged(OcclusionInput& input) {
                                                          input.push.capacity, seen);
   const auto model = std::make_shared<const OcclusionModel>(
       OcclusionModel{input, std::move(given.pyramid), std::move(given.survivors)});
-  return {
+  return asJudged(
       std::move(seen),
       expectationOf(
           "visible", decided, [model]<class T>(std::size_t i) { return model->membership<T>(i); },
           [model](std::size_t i) {
             return describe(model->input.bounds[model->survivors[i].firstInstance]);
-          })};
+          }),
+      kernelName);
 }
 
 void ListCase::expectRightTally(FrustumInput input) {
