@@ -85,12 +85,15 @@ bool runsObjects(const std::vector<std::string>& wanted) {
 
 std::string pattern(const std::vector<std::string>& wanted) {
   if (wanted.empty()) return ".*";
-  std::set<std::string> known = {kObjects};
-  for (const KernelRecord* r : catalogue()) known.insert(r->stage);
+  std::set<std::string> stages = {kObjects}, entries;
+  for (const KernelRecord* r : catalogue()) {
+    stages.insert(r->stage);
+    entries.insert(r->name());
+  }
   for (const std::string& s : wanted)
-    if (!known.contains(s))
-      throw UsageError(
-          fmt::format("there is no benchmark '{}'.\nThere are: {}", s, fmt::join(known, ", ")));
+    if (!stages.contains(s) && !entries.contains(s))
+      throw UsageError(fmt::format("there is no benchmark '{}'.\nThere are: {}, and STAGE/ENTRY", s,
+                                   fmt::join(stages, ", ")));
   return fmt::format("^({})/", fmt::join(wanted, "|"));
 }
 

@@ -188,8 +188,8 @@ void addBench(CLI::App& app, Action& action) {
   auto o = std::make_shared<BenchOptions>();
   command->add_option(
       "stages", o->stages,
-      "STAGE, or objects: culling of 100 to 1,000,000 objects in two worlds, beside "
-      "the CPU, and the law of its growth (default: all)");
+      "STAGE or STAGE/ENTRY, or objects: culling of 100 to 1,000,000 objects in two worlds, "
+      "beside the CPU, and the law of its growth (default: all)");
   command
       ->add_option_function<std::size_t>(
           "--to", [o](std::size_t n) { o->most = n; },

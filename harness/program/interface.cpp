@@ -437,7 +437,9 @@ class Matcher {
   }
 
   void placeImage(const ImageSpec& spec) {
-    const ReflectedBinding* found = binding(spec.name, spec.binding, "image", true);
+    // How a kernel reads an image is its own affair: it may fetch where ours takes a sampler.
+    const bool required = spec.kind() != BindingSlot::Kind::kSampler;
+    const ReflectedBinding* found = binding(spec.name, spec.binding, "image", required);
     if (found == nullptr) return;
     if (!(adapter == nullptr ? found->type == spec.type : agree(spec.type, found->type))) {
       lines.push_back(fmt::format("'{}' is {} in the shader, {} in the contract", spec.name,

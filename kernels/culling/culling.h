@@ -107,6 +107,7 @@ const uint kPyramid = 8;    // texture2D, R32F; its mip level m is level m + 1
 const uint kHizDepth = 0;    // of hiz
 const uint kHizLevels = 1;   // image2D[kMaxLevels], R32F
 const uint kHizScratch = 2;  // uint: groups that are done, then a texel of level kHizTile a group
+const uint kHizNearest = 3;  // sampler: of the nearest texel
 const uint kMaxLevels = 15;  // of images up to 65535 pixels wide
 const uint kHizTile = 6;     // a group makes one texel of this level, and all below it
 const uint kHizGroup = 256;

@@ -13,11 +13,14 @@
 layout(local_size_x = kHizGroup) in;
 layout(push_constant, scalar) uniform Push { Hiz push; };
 layout(set = 0, binding = kHizDepth) uniform texture2D depth;
+layout(set = 0, binding = kHizNearest) uniform sampler nearest;
 layout(set = 0, binding = kHizLevels) writeonly uniform image2D levels[kMaxLevels];
 layout(set = 0, binding = kHizScratch, scalar) coherent buffer Scratch { uint scratch[]; };
 
-// A tile has up to 127 texels a side (the last one takes the rest), and one level on up to 63.
+// A tile has up to 63 texels a side of the first level that it makes: the last one of a row or column
+// takes the rest.
 const uint kPitch = (1u << kHizTile) - 1u;
+const uvec2 kThreads = uvec2(1u << (kHizTile - 1u), kHizGroup >> (kHizTile - 1u));
 shared uint tileTexels[kPitch * kPitch];
 shared bool lastGroup;
 
@@ -56,95 +59,62 @@ uint load(uint level, uvec2 at) {
   return scratch[placeOf(level, at)];
 }
 
-// A texel of level base + 1.
+uint least(uint a, uint b, uint c, uint d) { return min(min(a, b), min(c, d)); }
+
+// Of the 2 x 2 texels from `first` on, in one go. Of the depth buffer those around their corner.
+uint leastOfFour(uint level, uvec2 first) {
+  if (level > 0u)
+    return least(load(level, first), load(level, first + uvec2(1, 0)),
+                 load(level, first + uvec2(0, 1)), load(level, first + 1u));
+  const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
+  const vec4 depths = textureGather(sampler2D(depth, nearest), corner);
+  return least(depthBits(depths.x), depthBits(depths.y), depthBits(depths.z), depthBits(depths.w));
+}
+
+// A texel of level base + 1, of 2 x 2 texels of level base or, the last of a row or column, of more
+// or fewer.
 uint firstStep(uint base, uvec2 at) {
   const uvec2 begin = 2u * at, end = endOf(at, base + 1u, 1u);
-  if (end == begin + 2u)  // all but the last: no loop, so that the loads overlap
-    return min(min(load(base, begin), load(base, begin + uvec2(1, 0))),
-               min(load(base, begin + uvec2(0, 1)), load(base, begin + 1u)));
+  if (end == begin + 2u) return leastOfFour(base, begin);
   uint farthest = kBeyondDepth;
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x) farthest = min(farthest, load(base, uvec2(x, y)));
   return farthest;
 }
 
-// A texel of a later level from those of the one before, which stand as far apart as the first ones
-// that they are made of: only the thread that makes a texel reads what stands in its place.
+// Texels of later levels stand as far apart as the first ones that they are made of: only the
+// thread that makes a texel reads what stands in its place.
+uint sharedPlace(uvec2 local, uint step) { return (local.y * kPitch + local.x) << (step - 1u); }
+
 uint laterStep(uvec2 begin, uvec2 end, uint step) {
   uint farthest = kBeyondDepth;
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x)
-      farthest = min(farthest, tileTexels[(y * kPitch + x) << (step - 2u)]);
+      farthest = min(farthest, tileTexels[sharedPlace(uvec2(x, y), step - 1u)]);
   return farthest;
 }
 
-uint least(uint a, uint b, uint c, uint d) { return min(min(a, b), min(c, d)); }
-
-uint depthAt(uvec2 at) { return depthBits(texelFetch(depth, ivec2(at), 0).r); }
-
-// A texel of level 1 that covers 2 x 2 pixels.
-uint quad(uvec2 at) {
-  const uvec2 first = 2u * at;
-  return least(depthAt(first), depthAt(first + uvec2(1, 0)), depthAt(first + uvec2(0, 1)),
-               depthAt(first + 1u));
-}
-
-// The same for a tile of the depth buffer that takes no rest: every thread has 4 x 4 pixels, all
-// loaded before the first is stored, and nothing has to be divided.
-void reduceWholeTile(uvec2 tile) {
-  const uint side = 1u << (kHizTile - 2u);
-  const uvec2 local = uvec2(gl_LocalInvocationIndex % side, gl_LocalInvocationIndex / side);
-  const uvec2 at = tile * side + local, first = 2u * at;
-  const uvec2 right = first + uvec2(1, 0), below = first + uvec2(0, 1), both = first + 1u;
-  const uint a = quad(first), b = quad(right), c = quad(below), d = quad(both);
-  const uint texel = least(a, b, c, d);
-  store(1u, first, a);
-  store(1u, right, b);
-  store(1u, below, c);
-  store(1u, both, d);
-  store(2u, at, texel);
-  tileTexels[gl_LocalInvocationIndex] = texel;
-  [[dont_unroll]] for (uint level = 3u; level <= kHizTile; ++level) {
-    barrier();
-    const uint texels = 1u << (kHizTile - level), apart = 1u << (level - 3u);
-    if (gl_LocalInvocationIndex < texels * texels) {
-      const uvec2 mine = uvec2(gl_LocalInvocationIndex % texels, gl_LocalInvocationIndex / texels);
-      const uint first = (mine.y * side + mine.x) * 2u * apart;
-      const uint lower =
-          least(tileTexels[first], tileTexels[first + apart], tileTexels[first + side * apart],
-                tileTexels[first + side * apart + apart]);
-      store(level, tile * texels + mine, lower);
-      tileTexels[first] = lower;
-    }
-  }
-  if (gl_LocalInvocationIndex == 0u) scratch[placeOf(kHizTile, tile)] = tileTexels[0];
-}
-
 // Levels base + 1 to base + kHizTile of one tile, the last of them into scratch where another round
-// goes on from it.
-void reduceTile(uint base, uvec2 tile) {
+// goes on from it. Neighbouring threads have neighbouring texels.
+void reduce(uint base, uvec2 tile) {
+  const uvec2 lane =
+      uvec2(gl_LocalInvocationIndex % kThreads.x, gl_LocalInvocationIndex / kThreads.x);
   [[dont_unroll]] for (uint step = 1u; step <= kHizTile; ++step) {
     barrier();
     const uint up = kHizTile - step;
     const uvec2 begin = tile << up, size = endOf(tile, base + kHizTile, up) - begin;
-    for (uint i = gl_LocalInvocationIndex; i < size.x * size.y; i += kHizGroup) {
-      const uvec2 local = uvec2(i % size.x, i / size.x), at = begin + local;
-      const uint texel = step == 1u
-                             ? firstStep(base, at)
-                             : laterStep(2u * local, endOf(at, base + step, 1u) - 2u * begin, step);
-      store(base + step, at, texel);
-      tileTexels[(local.y * kPitch + local.x) << (step - 1u)] = texel;
-    }
+    for (uint y = lane.y; y < size.y; y += kThreads.y)
+      for (uint x = lane.x; x < size.x; x += kThreads.x) {
+        const uvec2 local = uvec2(x, y), at = begin + local;
+        const uvec2 end = endOf(at, base + step, 1u) - 2u * begin;
+        const uint texel =
+            step == 1u ? firstStep(base, at) : laterStep(2u * local, end, step);
+        store(base + step, at, texel);
+        tileTexels[sharedPlace(local, step)] = texel;
+      }
   }
   if (gl_LocalInvocationIndex == 0u && base + kHizTile < lastLevel())
     scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
-}
-
-void reduce(uint base, uvec2 tile) {
-  if (base == 0u && endOf(tile, kHizTile, kHizTile) == (tile + 1u) << kHizTile)
-    reduceWholeTile(tile);
-  else
-    reduceTile(base, tile);
 }
 
 // Whether all other groups have written their texels of level kHizTile.

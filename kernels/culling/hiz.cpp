@@ -29,6 +29,10 @@ const bool whole = registerKernel({
                 .access = Access::kRead,
                 .type = "texture2D",
                 .format = PixelFormat::kD32},
+               {.name = "nearest",
+                .binding = kHizNearest,
+                .access = Access::kRead,
+                .type = "sampler"},
                {.name = "levels",
                 .binding = kHizLevels,
                 .access = Access::kWrite,
@@ -40,7 +44,6 @@ const bool whole = registerKernel({
       return {tilesOf(depth.width), tilesOf(depth.height), 1};
     },
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
-    .mutates = false,  // TODO: its score is not on record yet
     .conventions = {{"lookup", {"pinned", "next_pow2", "previous_pow2", "fold3"}}},
     .summary = "the pyramid of farthest depths, all levels in one dispatch",
 });
@@ -62,7 +65,6 @@ const bool level = registerKernel({
                 .format = PixelFormat::kR32f}},
     .push = describe<HizLevel>("HizLevel", field("size", &HizLevel::size)),
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
-    .mutates = false,  // TODO: its score is not on record yet
     .conventions = {{"lookup", {"pinned", "next_pow2", "previous_pow2", "fold3"}}},
     .summary = "one level of the pyramid of farthest depths, from the one before it",
 });

@@ -28,7 +28,8 @@ struct Edit {
 /// A kernel of the project's with some text replaced, or optimised, or one of data/kernels.
 struct Variant {
   std::string name, kernel, verdict, adapter;
-  std::string probe;  ///< the intermediate that the message must name; empty: any, or none
+  std::string probe;           ///< the intermediate that the message must name; empty: any, or none
+  nlohmann::json conventions{};  ///< that an adapter around it declares; null: it has none
   bool optimise = false;
   std::vector<Edit> edits;
 };
@@ -38,8 +39,8 @@ Edit editOf(const nlohmann::json& j) { return {j["file"], j["from"], j["to"]}; }
 
 /// Throws where a key is not one of these: misspelt, it would be a demand that nobody checks.
 Variant variantOf(const nlohmann::json& j) {
-  constexpr std::array kKeys = {"name",     "kernel", "class", "probe", "adapter",
-                                "optimise", "edits",  "file",  "from",  "to"};
+  constexpr std::array kKeys = {"name",  "kernel", "class", "probe", "adapter",    "optimise",
+                                "edits", "file",   "from",  "to",    "conventions"};
   for (const auto& [key, value] : j.items())
     if (std::ranges::find(kKeys, key) == kKeys.end())
       throw std::runtime_error(fmt::format("a variant has no key '{}'", key));
@@ -48,6 +49,7 @@ Variant variantOf(const nlohmann::json& j) {
             .verdict = j.value("class", "wrong"),
             .adapter = j.value("adapter", ""),
             .probe = j.value("probe", ""),
+            .conventions = j.value("conventions", nlohmann::json()),
             .optimise = j.value("optimise", false),
             .edits = {}};
   if (!v.probe.empty() && v.verdict != "wrong")
@@ -87,6 +89,14 @@ fs::path optimised(const fs::path& shader, const fs::path& kernels) {
   return spirv;
 }
 
+/// An adapter beside the shader.
+fs::path adapted(const fs::path& shader, const nlohmann::json& conventions) {
+  const fs::path adapter = fs::path(shader).replace_extension(".json");
+  std::ofstream(adapter) << nlohmann::json{{"files", {{"comp", shader.filename().string()}}},
+                                           {"conventions", conventions}};
+  return adapter;
+}
+
 /// The variant's file, in a copy of kernels/.
 fs::path fileOf(const Variant& v, const Scratch& scratch) {
   if (!v.adapter.empty()) return kRoot / "data/kernels" / v.adapter;
@@ -96,7 +106,8 @@ fs::path fileOf(const Variant& v, const Scratch& scratch) {
   // Entries that share a shader are not called after it.
   const bool shared = !v.edits.empty() && v.kernel.starts_with("precision/");
   const fs::path shader = copy / (shared ? v.edits.front().file : v.kernel + ".comp");
-  return v.optimise ? optimised(shader, copy) : shader;
+  if (v.optimise) return optimised(shader, copy);
+  return v.conventions.is_null() ? shader : adapted(shader, v.conventions);
 }
 
 /// Whether a message says that it first diverges there: at "G" or a component of it, and not at

@@ -103,7 +103,8 @@ class Stage {
         hizScratch(zeroed<uint>(2 + tiles())),
         ids(gpu.allocateImage(target(PixelFormat::kR32ui))),
         depth(gpu.allocateImage(target(PixelFormat::kD32))),
-        pyramid(gpu.allocateImage(levels())) {}
+        pyramid(gpu.allocateImage(levels())),
+        nearest(gpu.makeSampler({})) {}
 
   /// All objects' depth, their pyramid, and both lists, on the device alone.
   void cull() {
@@ -161,6 +162,7 @@ class Stage {
   GpuBuffer transforms, indices, camera, bounds, commands, survivors, found, draws, tally, scratch,
       hizScratch;
   GpuImage ids, depth, pyramid;
+  GpuSampler nearest;
 
  private:
   static std::vector<mat4> placed(const Scene& scene) {
@@ -207,6 +209,7 @@ class Stage {
     return {.program = &Session::current().subject("culling/hiz").plain(),
             .buffers = {{buffer(kHizScratch), &hizScratch}},
             .images = {{.slot = {0, kHizDepth, BindingSlot::Kind::kSampledImage}, .image = &depth},
+                       {.slot = {0, kHizNearest, BindingSlot::Kind::kSampler}, .sampler = &nearest},
                        {.slot = all, .image = &pyramid}},
             .push = bytesOf(Hiz{scene.size}),
             .groups = {grid.x, grid.y, 1}};

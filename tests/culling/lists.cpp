@@ -52,6 +52,13 @@ bool isForeign(const std::string& kernel) {
   return Session::current().options().kernels.contains(kernel);
 }
 
+/// Whether a kernel of a user's says that it keeps more than the contract does.
+bool keepsMore(const std::string& kernel) {
+  const auto& conventions = Session::current().subject(kernel).conventions();
+  const auto said = conventions.find("keeps");
+  return said != conventions.end() && said->second == "more";
+}
+
 Bounded withValue(Bounded x, const Bounded& of) {
   x.value = of.value;
   return x;
@@ -62,7 +69,8 @@ struct Totals {
   std::size_t candidates = 0;
   uint capacity = 0, patience = 0;
   Tally said{};          ///< by the kernel
-  bool foreign = false;  ///< may keep more, and count as it likes
+  bool foreign = false;  ///< may count again as it likes
+  bool more = false;     ///< may keep more
 
   /// Blocks that are counted again where nobody is asked: all before each.
   uint allBlocks() const {
@@ -87,7 +95,7 @@ Counts<T> countsOf(const Totals& totals, const Member& member) {
   T total = T(0);
   for (std::size_t i = 0; i < totals.candidates; ++i)
     total = total + member.template operator()<T>(i);
-  if (totals.foreign) total = T(std::max(totals.said.total, static_cast<uint>(leastOf(total))));
+  if (totals.more) total = T(std::max(totals.said.total, static_cast<uint>(leastOf(total))));
   const T most = T(totals.capacity);
   return {T(static_cast<uint>(totals.candidates)), total, min(total, most),
           select(total > most, T(1), T(0)), T(recountedOf(totals))};
@@ -100,8 +108,8 @@ Expectation tallyOf(const Totals& totals, Member member) {
       [=](std::size_t) { return fmt::format("    {} candidates\n", totals.candidates); });
 }
 
-/// A kernel of a user's may keep more than ours, since nothing visible is lost by it: what need not
-/// be listed may be.
+/// A kernel that says so may keep more, since nothing visible is lost by it: what need not be
+/// listed may be.
 void allowMore(Expectation& visible) {
   visible.bounded = [ours = visible.bounded](std::size_t i, std::span<Bounded> out) {
     ours(i, out);
@@ -128,7 +136,7 @@ void refuseTheLoose(const Expectation& visible, Observation& seen) {
 }
 
 Trial asJudged(Observation seen, Expectation visible, const std::string& kernel) {
-  if (seen.applies && isForeign(kernel)) allowMore(visible);
+  if (seen.applies && keepsMore(kernel)) allowMore(visible);
   return {std::move(seen), std::move(visible)};
 }
 
@@ -237,7 +245,7 @@ OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
 }
 
 Trial ListCase::notLoose(Trial trial) const {
-  if (trial.seen.applies && isForeign(kernelName)) refuseTheLoose(trial.expected, trial.seen);
+  if (trial.seen.applies && keepsMore(kernelName)) refuseTheLoose(trial.expected, trial.seen);
   return trial;
 }
 
@@ -279,8 +287,8 @@ Trial ListCase::judged(OcclusionInput& input) {
 
 void ListCase::expectRightTally(FrustumInput input) {
   const Observation seen = judged(input).seen;
-  const Totals totals{input.bounds.size(), input.push.capacity, input.push.patience, tallyBy(seen),
-                      isForeign(kernelName)};
+  const Totals totals{input.bounds.size(), input.push.capacity,   input.push.patience,
+                      tallyBy(seen),       isForeign(kernelName), keepsMore(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [&input]<class T>(std::size_t i) { return membership<T>(input, i); }));
 }
@@ -290,8 +298,8 @@ void ListCase::expectRightTally(OcclusionInput input) {
   const OcclusionStimulus given(input);
   const auto model =
       std::make_shared<const OcclusionModel>(OcclusionModel{input, given.pyramid, given.survivors});
-  const Totals totals{model->survivors.size(), input.push.capacity, input.push.patience,
-                      tallyBy(seen), isForeign(kernelName)};
+  const Totals totals{model->survivors.size(), input.push.capacity,   input.push.patience,
+                      tallyBy(seen),           isForeign(kernelName), keepsMore(kernelName)};
   expectConforms(
       seen, tallyOf(totals, [model]<class T>(std::size_t i) { return model->membership<T>(i); }));
 }

@@ -69,8 +69,8 @@ class ListCase : public KernelCase {
   Trial judged(FrustumInput& input);
   Trial judged(OcclusionInput& input);
 
-  /// A finding where a foreign kernel keeps most of what it has to cull. Laws do not ask: what a
-  /// looser kernel has left may be all that it would cull.
+  /// A finding where a kernel that keeps more keeps most of what it has to cull. Laws do not ask:
+  /// what a looser kernel has left may be all that it would cull.
   Trial notLoose(Trial trial) const;
 
   void expectRightList(FrustumInput input) {

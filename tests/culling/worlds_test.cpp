@@ -4,7 +4,7 @@
 // is before the camera is hidden and in the field little, at every size; depth at pixels against
 // every box in double; CPU modes and the model of the frustum agree. Not covered: time.
 #include <algorithm>
-#include <cstring>
+#include <span>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -26,7 +26,7 @@ constexpr WorldKind kKinds[] = {WorldKind::kCity, WorldKind::kField};
 
 template <class T>
 bool sameBytes(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+  return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
 }
 
 TEST(CullingFrustumWorldModel, IsTheSameForTheSameSeedAndHasThatManyObjects) {
