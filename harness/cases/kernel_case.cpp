@@ -88,6 +88,7 @@ Observation KernelCase::run(Stimulus stimulus) {
   if (!applies(stimulus.push)) return {.applies = false};
   ++runs;
   stimulus.limit = session.limit();
+  session.currentCase().observed = true;
   const Subject& subject = session.subject(kernelName);
   Observation seen = observe(subject, stimulus, session.watch());
   if (session.options().probes && !subject.record().probes.fields.empty())

@@ -49,6 +49,7 @@ struct CaseRecord {
   std::optional<std::string> unsupported{};  ///< what the device lacks
   std::optional<std::string> waived{};       ///< why its failure is excused
   bool threadsCommunicate = false;           ///< in its kernel, as Subject says
+  bool observed = false;                     ///< it ran the kernel as Session::watch() says
   bool usesSubgroups = false;
   std::size_t elements = 0;  ///< checked, by a verdict or by a law
   double seconds = 0;

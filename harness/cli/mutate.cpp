@@ -245,6 +245,8 @@ int mutate(const MutateOptions& options) {
     MutantRecords records;
     if (ours) records = loadMutantRecords(recordFile(root, question.kernel));
     Answer answer = mutation.ask(question);
+    // Entries may share a model: it is mutated under the one whose suites call it.
+    if (question.ofModel && answer.mutants.empty()) return;
     const MutantRecord record = records[answer.kernel];
     outcomes.push_back(outcomeOf(std::move(answer), record, mutation.policy(), whole));
     printSurvivors(terminal, outcomes.back());

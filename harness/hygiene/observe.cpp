@@ -101,7 +101,7 @@ class Observer {
   /// What communicating threads must not depend on, against what the strict twin gave.
   void compareArrangements() {
     if (!subject.threadsCommunicate() || !subject.record().deterministic) return;
-    compare(*subject.orderTwin(),
+    compare(subject.orderTwin(),
             "with the order of its groups and of the subgroups in a group turned round",
             "a barrier is missing, or its groups race");
     for (const auto& [size, program] : subject.resizedTwins())

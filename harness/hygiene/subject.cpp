@@ -1,6 +1,7 @@
 #include "harness/hygiene/subject.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -62,11 +63,10 @@ Subject::Subject(Gpu& gpu, const KernelRecord& record, KernelModule module)
   subgroups = asksForSubgroups(reflection);
   const StrictOptions strict{.signedZeroInfNanPreserve = gpu.info().signedZeroInfNanFloat32,
                              .roundingModeRte = gpu.info().roundingRteFloat32};
-  const SpirvWords twinModule = strictTwin(module.words, strict);
+  twinModule = strictTwin(module.words, strict);
   twinProgram = gpu.build(description(twinModule));
-  if (readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module.words))
-    buildCommunicationTwins(twinModule);
-  plainProgram = gpu.build(description(std::move(module.words)));
+  communicates = readsWhatItWrites(reflection) || gnomon::threadsCommunicate(module.words);
+  plainModule = std::move(module.words);
 }
 
 ProgramDescription Subject::description(SpirvWords module) const {
@@ -78,18 +78,34 @@ ProgramDescription Subject::description(SpirvWords module) const {
   return d;
 }
 
-void Subject::buildCommunicationTwins(const SpirvWords& twinModule) {
+const GpuProgram& Subject::plain() const {
+  if (!plainProgram) plainProgram = device->build(description(plainModule));
+  return *plainProgram;
+}
+
+const GpuProgram& Subject::orderTwin() const {
+  if (!communicates) throw std::logic_error(contract->name() + " has no order of threads to turn");
+  if (!turned)
+    turned = device->build(
+        description(gnomon::orderTwin(twinModule, {.subgroupSize = device->info().subgroupSize})));
+  return *turned;
+}
+
+const std::map<unsigned, GpuProgram>& Subject::resizedTwins() const {
+  if (resized) return *resized;
+  resized.emplace();
   const GpuInfo& info = device->info();
-  turned = device->build(
-      description(gnomon::orderTwin(twinModule, {.subgroupSize = info.subgroupSize})));
   const auto& group = mapping.groupSize;
   const std::size_t threads = std::size_t{group[0]} * group[1] * group[2];
   for (const unsigned size : info.subgroupSizes) {
-    if (size == info.subgroupSize || threads > std::size_t{size} * info.maxGroupSubgroups) continue;
+    if (!communicates || size == info.subgroupSize ||
+        threads > std::size_t{size} * info.maxGroupSubgroups)
+      continue;
     ProgramDescription sized = description(twinModule);
     sized.subgroupSize = size;
-    resized.emplace(size, device->build(sized));
+    resized->emplace(size, device->build(sized));
   }
+  return *resized;
 }
 
 }  // namespace gnomon

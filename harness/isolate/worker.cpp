@@ -75,7 +75,9 @@ void loadForeignKernels(Session& session, Preparation& found) {
     say(kLoading, file.string());
     commitFault(kernel);
     try {
-      found.unmapped[kernel] = session.subject(kernel).interface().unmapped;
+      const Subject& subject = session.subject(kernel);
+      found.unmapped[kernel] = subject.interface().unmapped;
+      subject.plain();              // a driver that chokes on it does so here
     } catch (const Unsupported&) {  // the case will say so
     }
     found.foreign[kernel] = session.foreignHash(kernel);
@@ -103,27 +105,34 @@ void end(const Session& session, const CaseRecord& record) {
   if (session.deviceLost() || losesDevice(record.name)) _exit(0);
 }
 
-/// Of these cases, in this order, until so many have failed; returns how many have.
-unsigned failuresOf(Session& session, const std::vector<CaseName>& cases, unsigned atMost,
-                    const Observer& observer) {
+/// What became of cases that were run until enough of them had failed.
+struct Round {
   unsigned failures = 0;
+  std::vector<CaseName> observing{};  ///< those that see more where more is watched
+};
+
+Round runUntil(unsigned enough, Session& session, const std::vector<CaseName>& cases,
+               const Observer& observer) {
+  Round round;
   for (const CaseName& c : cases) {
-    if (failures == atMost) break;
+    if (round.failures == enough) break;
     runCases(session, {c}, observer);
-    failures += session.currentCase().failed;
+    round.failures += session.currentCase().failed;
+    // Laws look at the strict twin alone.
+    if (session.currentCase().observed && kindOf(c) != Kind::kLaw) round.observing.push_back(c);
   }
-  return failures;
+  return round;
 }
 
 /// The strict twin alone is what most mutants fail by, at a third of the time that compiling all of
-/// it takes. One that fails by nothing there is watched whole, but by laws, which look at no more.
-void runToFailures(Session& session, std::vector<CaseName> cases, unsigned failures,
+/// it takes. One that fails by nothing there is watched whole.
+void runToFailures(Session& session, const std::vector<CaseName>& cases, unsigned failures,
                    const Observer& observer) {
   session.watchOnly(Watch::kTwinAlone);
-  if (failuresOf(session, cases, failures, observer) > 0) return;
+  const Round twinAlone = runUntil(failures, session, cases, observer);
+  if (twinAlone.failures > 0) return;
   session.watchOnly(Watch::kAll);
-  std::erase_if(cases, [](const CaseName& c) { return kindOf(c) == Kind::kLaw; });
-  failuresOf(session, cases, failures, observer);
+  runUntil(failures, session, twinAlone.observing, observer);
 }
 
 void judgeMutants(Session& session, const WorkerTask& task, const std::vector<CaseName>& cases,
@@ -175,6 +184,12 @@ void serve(const WorkerTask& task) {
 
 namespace {
 
+/// How long a step may take: a case, or what comes before and after it.
+std::chrono::milliseconds patience(const WorkerOptions& options, const std::string& running) {
+  if (options.limitOf && !running.empty()) return options.limitOf(running);
+  return options.limit + kGrace;
+}
+
 /// Follows what a worker says, and until when its present step may take.
 class Listener {
  public:
@@ -202,17 +217,17 @@ class Listener {
     return true;
   }
 
-  void startAgain() { deadline = Clock::now() + options.limit + kGrace; }
+  void startAgain() { deadline = Clock::now() + patience(options, report.running); }
 
   void beginCase(std::string name) {
-    startAgain();
     report.running = std::move(name);
+    startAgain();
     if (options.begun) options.begun(report.running);
   }
 
   void endCase(CaseRecord record) {
-    startAgain();
     report.running.clear();
+    startAgain();
     ++report.ended;
     if (options.ended) options.ended(std::move(record));
   }
@@ -251,8 +266,8 @@ std::string complaint(const ProcessResult& end) {
 
 std::string WorkerReport::death(const WorkerOptions& options) const {
   if (process.end == ProcessResult::End::kTimedOut)
-    return fmt::format("did not end within {:g} s (and {} s of grace) and {}",
-                       std::chrono::duration<double>(options.limit).count(), kGrace.count(),
+    return fmt::format("did not end within {:g} s and {}",
+                       std::chrono::duration<double>(patience(options, running)).count(),
                        process.status == 0 ? "was stopped" : "could not be stopped");
   std::string why = process.inWords();
   if (!process.errors.empty()) why += "; it said last:\n" + lastLines(process.errors);

@@ -1,6 +1,8 @@
 #include "harness/mutate/campaign.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <deque>
 #include <exception>
 #include <mutex>
@@ -137,6 +139,7 @@ class Campaign {
   WorkerOptions optionsFor(Chunk& chunk) {
     return {.environment = chunk.environment,
             .limit = caseLimit(schedule.session, schedule.policy),
+            .limitOf = [this](const std::string& name) { return patience(name); },
             .memoryBytes = memoryLimit(schedule.policy, "foreignGibibytes"),
             .ended =
                 [this, &chunk](CaseRecord record) {
@@ -152,6 +155,16 @@ class Campaign {
                   if (observer.begun) observer.begun(mutants[chunk.mutants.front()]);
                 },
             .told = [this, &chunk](const std::string&, const std::string&) { settle(chunk); }};
+  }
+
+  /// A mutant may hang: ten times what a case needs for the kernel itself is enough.
+  std::chrono::milliseconds patience(const std::string& name) const {
+    constexpr double kTimes = 10, kLeast = 2;
+    const auto w = std::ranges::find(witnesses, name, [](const Witness& x) { return x.name.name; });
+    const double seconds = w == witnesses.end() ? 0 : w->seconds;
+    return std::min(
+        caseLimit(schedule.session, schedule.policy),
+        std::chrono::milliseconds(std::lround(1000 * std::max(kLeast, kTimes * seconds))));
   }
 
   void settle(Chunk& chunk) {

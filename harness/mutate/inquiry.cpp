@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <random>
 
 #include <fmt/format.h>
@@ -36,15 +35,6 @@ void keepSample(std::vector<Mutant>& mutants, std::size_t count, std::uint64_t s
     std::swap(mutants[i], mutants[i + random() % (mutants.size() - i)]);
   mutants.resize(count);
   std::ranges::sort(mutants, {}, &Mutant::id);
-}
-
-/// A mutant may hang, and then takes all the time that a case has: ten times what the slowest
-/// needs, instead of a minute.
-std::chrono::seconds patience(const std::vector<Witness>& witnesses) {
-  constexpr double kTimes = 10, kLeast = 3;
-  double slowest = 0;
-  for (const Witness& w : witnesses) slowest = std::max(slowest, w.seconds);
-  return std::chrono::seconds(std::lround(std::max(kLeast, kTimes * slowest)));
 }
 
 std::filesystem::path cacheFile(const Preparation& prepared, std::string kernel) {
@@ -145,7 +135,6 @@ class Inquiry {
     tell("the kernel itself");
     const std::vector<Witness> witnesses = witnessesOf(schedule, question.kernel, question.by);
     SessionOptions session = schedule.session;
-    if (!session.timeout) session.timeout = patience(witnesses);
     session.shrinks = session.probes = false;  // that it fails is all that is asked
     judgeMutants(
         {session, schedule.policy, schedule.jobs, schedule.errors}, prepared.gpu, question.kernel,

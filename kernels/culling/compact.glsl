@@ -10,70 +10,69 @@
 // Whoever includes this has `scratch` and `tally` and defines isVisible and list. isVisible has to
 // come to the same answer wherever a compiler inlines it, so its arithmetic is `precise`.
 
-shared uint blockOfGroup;
+#include "../lib/thread.glsl"
+
 const uint kWords = kBlock / 32;
-shared uint visible[kWords];          // a bit a candidate
+const uint kPerThread = kBlock / kGroupSize;
+shared uint visible[kWords];  // a bit a candidate
+shared uint blockOfGroup;
 shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
 shared uint visibleBefore;            // the block
-shared uint recounted;
-shared uint done;  // threads
 shared bool isLastGroup;
 
 bool isVisible(uint candidate);
 void list(uint candidate, uint position);
 
-uint blocksOf(uint candidates) { return max((candidates + kBlock - 1) / kBlock, 1u); }
+uint blocksOf(uint candidates) { return (candidates + kBlock - 1) / kBlock; }
 
-uint countAgain(uint block, uint candidates) {
-  atomicAdd(recounted, 1u);
-  const uint end = min((block + 1) * kBlock, candidates);
+/// A block before the group's own, so a whole one.
+uint countAgain(uint block) {
+  atomicAdd(scratch[kRecounted], 1u);
   uint count = 0;
-  for (uint c = block * kBlock; c < end; ++c) count += uint(isVisible(c));
+  for (uint c = block * kBlock; c < (block + 1) * kBlock; ++c) count += uint(isVisible(c));
   return count;
 }
 
-uint countOf(uint block, uint candidates, inout uint patience) {
+uint countOf(uint block, inout uint patience) {
   for (; patience > 0; --patience) {
     const uint answer = atomicOr(scratch[kBlocks + block], 0u);
     if (answer != 0) return answer - 1;
   }
-  return countAgain(block, candidates);
+  return countAgain(block);
 }
 
 void takeBlock(uint lane) {
-  if (lane == 0) {
+  if (isFirstThread()) {
     blockOfGroup = atomicAdd(scratch[kTicket], 1u);
     visibleBefore = 0;
-    recounted = 0;
-    done = 0;
-    isLastGroup = false;
   }
-  for (uint w = lane; w < kWords; w += kGroupSize) visible[w] = 0;
+  if (lane < kWords) visible[lane] = 0;
   barrier();
 }
 
-void markVisible(uint lane, uint first, uint candidates) {
-  const uint inBlock = min(kBlock, candidates - first);
-  for (uint i = lane; i < inBlock; i += kGroupSize)
-    if (isVisible(first + i)) atomicOr(visible[i / 32], 1u << i % 32);
+void markVisible(uint lane, uint candidates) {
+  for (uint k = 0; k < kPerThread; ++k) {
+    const uint i = k * kGroupSize + lane, candidate = blockOfGroup * kBlock + i;
+    if (candidate < candidates && isVisible(candidate)) atomicOr(visible[i / 32], 1u << i % 32);
+  }
   barrier();
 }
 
 /// Says how many there are before anybody asks, for threads of a subgroup that wait may keep others
 /// from speaking.
-void publish(uint lane, uint block) {
+void publish(uint lane) {
   if (lane <= kWords) {
     uint before = 0;
     for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
     visibleUpTo[lane] = before;
-    if (lane == kWords) atomicExchange(scratch[kBlocks + block], before + 1);
+    if (lane == kWords) atomicExchange(scratch[kBlocks + blockOfGroup], before + 1);
   }
   barrier();
 }
 
-void askOthers(uint lane, uint block, uint candidates, uint patience) {
+void askOthers(uint lane, uint patience) {
   uint before = 0;
-  for (uint b = lane; b < block; b += kGroupSize) before += countOf(b, candidates, patience);
+  for (uint b = lane; b < blockOfGroup; b += kGroupSize) before += countOf(b, patience);
 #ifdef GNOMON_SUBGROUPS
   before = subgroupAdd(before);
   if (subgroupElect()) atomicAdd(visibleBefore, before);
@@ -83,52 +82,48 @@ void askOthers(uint lane, uint block, uint candidates, uint patience) {
   barrier();
 }
 
-void listBlock(uint lane, uint first, uint capacity) {
-  for (uint i = lane; i < kBlock; i += kGroupSize) {
-    const uint word = visible[i / 32], bit = 1u << i % 32;
+void listBlock(uint lane, uint capacity) {
+  for (uint k = 0; k < kPerThread; ++k) {
+    const uint i = k * kGroupSize + lane, word = visible[i / 32], bit = 1u << i % 32;
     if ((word & bit) == 0) continue;
     const uint position = visibleBefore + visibleUpTo[i / 32] + bitCount(word & bit - 1);
-    if (position < capacity) list(first + i, position);
+    if (position < capacity) list(blockOfGroup * kBlock + i, position);
   }
 }
 
 void sumUp(uint candidates, uint capacity) {
-  const uint total = atomicOr(scratch[kTotal], 0u);
+  const uint total = scratch[kTotal];
   tally[0].tested = candidates;
   tally[0].total = total;
   tally[0].listed = min(total, capacity);
   tally[0].overflowed = uint(total > capacity);
-  tally[0].recounted = atomicOr(scratch[kRecounted], 0u);
+  tally[0].recounted = scratch[kRecounted];
 }
 
 /// The last group of all sums up and leaves the scratch as it was: zero.
 void finish(uint lane, uint candidates, uint capacity) {
   memoryBarrierBuffer();
-  if (atomicAdd(done, 1u) == kGroupSize - 1) {
-    if (recounted > 0) atomicAdd(scratch[kRecounted], recounted);
-    memoryBarrierBuffer();
+  barrier();
+  if (isFirstThread()) {
     isLastGroup = atomicAdd(scratch[kFinished], 1u) == gl_NumWorkGroups.x - 1;
+    memoryBarrierBuffer();
+    if (isLastGroup) sumUp(candidates, capacity);
   }
   barrier();
   if (!isLastGroup) return;
-  memoryBarrierBuffer();
-  if (lane == 0) sumUp(candidates, capacity);
-  barrier();
-  for (uint i = lane; i < kBlocks + blocksOf(candidates); i += kGroupSize)
-    atomicExchange(scratch[i], 0u);
+  for (uint i = lane; i < kBlocks + blocksOf(candidates); i += kGroupSize) scratch[i] = 0u;
 }
 
 void compact(uint candidates, uint capacity, uint patience) {
   const uint lane = gl_LocalInvocationIndex;
   takeBlock(lane);
-  const uint block = blockOfGroup, first = block * kBlock;
-  if (block < blocksOf(candidates)) {  // the host may not know how many there are
-    markVisible(lane, first, candidates);
-    publish(lane, block);
-    askOthers(lane, block, candidates, patience);
-    listBlock(lane, first, capacity);
-    if (lane == 0 && block == blocksOf(candidates) - 1)
-      atomicExchange(scratch[kTotal], visibleBefore + visibleUpTo[kWords]);
+  if (blockOfGroup < blocksOf(candidates)) {  // the host may not know how many there are
+    markVisible(lane, candidates);
+    publish(lane);
+    askOthers(lane, patience);
+    listBlock(lane, capacity);
+    // What is visible up to a block only grows with it: the last one's is all.
+    if (isFirstThread()) atomicMax(scratch[kTotal], visibleBefore + visibleUpTo[kWords]);
   }
   finish(lane, candidates, capacity);
 }

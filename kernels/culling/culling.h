@@ -88,7 +88,7 @@ const uint kPatience = 20000;
 // Scratch of frustum and occlusion, zero before and after a dispatch: kBlocks + one a block.
 const uint kTicket = 0;     // blocks taken so far
 const uint kFinished = 1;   // groups that are done
-const uint kTotal = 2;      // visible candidates, said by whoever has the last block
+const uint kTotal = 2;      // visible candidates, as far as said; of the last block all
 const uint kRecounted = 3;  // blocks counted again
 const uint kBlocks = 4;     // from here on for each block its count + 1, 0: not counted yet
 

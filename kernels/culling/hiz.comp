@@ -8,6 +8,7 @@
 #extension GL_EXT_shader_image_load_formatted : require
 #extension GL_EXT_control_flow_attributes : require
 #include "culling.h"
+#include "../lib/thread.glsl"
 #include "hiz.glsl"
 
 layout(local_size_x = kHizGroup) in;
@@ -17,8 +18,8 @@ layout(set = 0, binding = kHizNearest) uniform sampler nearest;
 layout(set = 0, binding = kHizLevels) writeonly uniform image2D levels[kMaxLevels];
 layout(set = 0, binding = kHizScratch, scalar) coherent buffer Scratch { uint scratch[]; };
 
-// A tile has up to 63 texels a side of the first level that it makes: the last one of a row or column
-// takes the rest.
+// A tile has up to 63 texels a side of the first level that it makes: the last one of a row or
+// column takes the rest.
 const uint kPitch = (1u << kHizTile) - 1u;
 const uvec2 kThreads = uvec2(1u << (kHizTile - 1u), kHizGroup >> (kHizTile - 1u));
 shared uint tileTexels[kPitch * kPitch];
@@ -94,8 +95,8 @@ uint laterStep(uvec2 begin, uvec2 end, uint step) {
   return farthest;
 }
 
-// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch where another round
-// goes on from it. Neighbouring threads have neighbouring texels.
+// Levels base + 1 to base + kHizTile of one tile, the last of them into scratch, where another
+// round may go on from it. Neighbouring threads have neighbouring texels.
 void reduce(uint base, uvec2 tile) {
   const uvec2 lane =
       uvec2(gl_LocalInvocationIndex % kThreads.x, gl_LocalInvocationIndex / kThreads.x);
@@ -107,19 +108,17 @@ void reduce(uint base, uvec2 tile) {
       for (uint x = lane.x; x < size.x; x += kThreads.x) {
         const uvec2 local = uvec2(x, y), at = begin + local;
         const uvec2 end = endOf(at, base + step, 1u) - 2u * begin;
-        const uint texel =
-            step == 1u ? firstStep(base, at) : laterStep(2u * local, end, step);
+        const uint texel = step == 1u ? firstStep(base, at) : laterStep(2u * local, end, step);
         store(base + step, at, texel);
         tileTexels[sharedPlace(local, step)] = texel;
       }
   }
-  if (gl_LocalInvocationIndex == 0u && base + kHizTile < lastLevel())
-    scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
+  if (isFirstThread()) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
 }
 
 // Whether all other groups have written their texels of level kHizTile.
 bool isLastGroup() {
-  if (gl_LocalInvocationIndex == 0u) {
+  if (isFirstThread()) {
     memoryBarrierBuffer();
     lastGroup = atomicAdd(scratch[0], 1u) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
     memoryBarrierBuffer();

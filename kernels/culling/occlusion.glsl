@@ -29,10 +29,11 @@ vec2 slopes(float c, float d, float r, float nearest) {
   precise const float side = t + rho * x;
   precise const float far = (t * x + rho) * side / (rest * (1.0 + x * x));
   precise const float near = (t * x - rho) / side;
-  return c < 0.0 ? vec2(-far, -near) : vec2(near, far);
+  const vec2 both = vec2(near, far);
+  return c < 0.0 ? -both : both;
 }
 
-// The same as clip coordinates x / w.
+// The same as clip coordinates x / w, in order.
 vec2 covered(float c, float d, float r, float nearest, float scale, float skew, float shift,
              bool perspective) {
   precise vec2 clip;
@@ -43,13 +44,11 @@ vec2 covered(float c, float d, float r, float nearest, float scale, float skew, 
   return vec2(min(clip.x, clip.y), max(clip.x, clip.y));
 }
 
-// First and last pixel on the screen, clamped to it.
+// First and last pixel on the screen, clamped to it; a conversion rounds down what is not negative.
 uvec2 pixels(vec2 clip, uint size) {
   precise const vec2 at = (clip * 0.5 + 0.5) * float(size);
-  return uvec2(clamp(floor(at), 0.0, float(size - 1)));
+  return uvec2(clamp(at, 0.0, float(size - 1)));
 }
-
-float farther(float a, float b) { return min(a, b); }
 
 float texel(uvec2 at, uint level) {
   if (level > 0) return texelFetch(pyramid, ivec2(at), int(level) - 1).r;
@@ -57,15 +56,17 @@ float texel(uvec2 at, uint level) {
   return isFinite(d) && d > 0.0 ? d : 0.0;
 }
 
+// findMSB of 0 is -1, so that a single pixel is on level 0. Where a level has no texel for a side
+// but the one that takes all, x is 0 already, and 0 - 1 is beyond it.
 float farthestIn(uvec2 x, uvec2 y) {
   const uint side = max(x[1] - x[0], y[1] - y[0]) + 1;
-  const uint last = findMSB(max(push.size.x, push.size.y));
-  const uint level = min(side == 1 ? 0u : uint(findMSB(side - 1)) + 1, last);
-  const uvec2 end = max(push.size >> level, 1u) - 1;
+  const int last = findMSB(max(push.size.x, push.size.y));
+  const uint level = uint(min(findMSB(side - 1) + 1, last));
+  const uvec2 end = (push.size >> level) - 1;
   x = min(x >> level, end.x);
   y = min(y >> level, end.y);
-  return farther(farther(texel(uvec2(x[0], y[0]), level), texel(uvec2(x[1], y[0]), level)),
-                 farther(texel(uvec2(x[0], y[1]), level), texel(uvec2(x[1], y[1]), level)));
+  return min(min(texel(uvec2(x[0], y[0]), level), texel(uvec2(x[1], y[0]), level)),
+             min(texel(uvec2(x[0], y[1]), level), texel(uvec2(x[1], y[1]), level)));
 }
 
 bool isNotHidden(vec3 centre, float r) {

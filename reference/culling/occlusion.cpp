@@ -32,13 +32,19 @@ struct PixelRange {
   Coordinate first, last;
 };
 
+/// From clip coordinates to pixels, clamped to the screen.
 template <class T>
-PixelRange rangeOf(const Slopes<T>& clip, uint size) {
+Slopes<T> onScreen(const Slopes<T>& clip, uint size) {
   const auto pixel = [&](const T& at) {
     const T scaled = (at * T(0.5f) + T(0.5f)) * input<T>(static_cast<float>(size));
-    return pixelAt(clamp(scaled, T(0), input<T>(static_cast<float>(size - 1))));
+    return clamp(scaled, T(0), input<T>(static_cast<float>(size - 1)));
   };
   return {pixel(clip.least), pixel(clip.most)};
+}
+
+template <class T>
+PixelRange rangeOf(const Slopes<T>& pixels) {
+  return {pixelAt(pixels.least), pixelAt(pixels.most)};
 }
 
 template <class T>
@@ -155,28 +161,29 @@ float farthestIn(const Pyramid& pyramid, const PixelRect& rect) {
 }
 
 template <class T>
-T unoccluded(const Camera& camera, const Bounds& sphere, const Occlusion& push,
-             const Pyramid& pyramid) {
-  if (!isUsable(sphere)) return T(1);
+Sight<T> sightOf(const Camera& camera, const Bounds& sphere, const Occlusion& push,
+                 const Pyramid& pyramid) {
+  if (!isUsable(sphere)) return {.visible = T(1)};
   const Seen<T> s = seenBy<T>(camera, sphere, push.pad);
   const auto crosses = s.nearest < input<T>(camera.near);
-  if (certainly(crosses)) return T(1);
+  if (certainly(crosses)) return {.visible = T(1)};
   const bool perspective = isPerspective(camera);
   const auto steep = max(abs(s.x), abs(s.y)) > input<T>(kSteepest) * s.d;
-  if (perspective && certainly(steep)) return T(1);
-  const PixelRange x =
-      rangeOf(covered(s.x, s, axisOf<T>(camera.projection, 0), perspective), push.size.x);
-  const PixelRange y =
-      rangeOf(covered(s.y, s, axisOf<T>(camera.projection, 1), perspective), push.size.y);
-  const T shown = notHidden(depthAt(s.nearest, camera), x, y, pyramid);
+  if (perspective && certainly(steep)) return {.visible = T(1)};
+  const Slopes<T> x =
+      onScreen(covered(s.x, s, axisOf<T>(camera.projection, 0), perspective), push.size.x);
+  const Slopes<T> y =
+      onScreen(covered(s.y, s, axisOf<T>(camera.projection, 1), perspective), push.size.y);
+  const T depth = depthAt(s.nearest, camera);
+  const T shown = notHidden(depth, rangeOf(x), rangeOf(y), pyramid);
   const auto kept = perspective ? crosses || steep : crosses;
-  return select(kept, T(1), shown);
+  return {select(kept, T(1), shown), x.least, x.most, y.least, y.most, depth};
 }
 
 template Slopes<double> tangents(const double&, const double&, const double&, const double&);
 template Slopes<Altered> tangents(const Altered&, const Altered&, const Altered&, const Altered&);
-template double unoccluded(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
-template Bounded unoccluded(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
-template Altered unoccluded(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
+template Sight<double> sightOf(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
+template Sight<Bounded> sightOf(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
+template Sight<Altered> sightOf(const Camera&, const Bounds&, const Occlusion&, const Pyramid&);
 
 }  // namespace gnomon::culling

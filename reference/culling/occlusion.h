@@ -47,12 +47,28 @@ uint queryLevel(const PixelRect& rect, const uvec2& size);
 /// The farthest depth of the texels that hold the rectangle's corners on that level.
 float farthestIn(const Pyramid& pyramid, const PixelRect& rect);
 
-/// 1 where the sphere, grown by push.pad, is not hidden, 0 where it is; of bounds both, where
-/// rounding may decide. More pixels never make it less visible (their texels are inside those of
-/// fewer pixels, whose farthest depth is no nearer), so an uncertain rectangle is visible for sure
-/// where its smallest form is, and hidden for sure where its largest is.
+/// What decides whether a sphere, grown by push.pad, is hidden.
+template <class T>
+struct Sight {
+  /// 1 where it is not, 0 where it is; of bounds both, where rounding may decide.
+  T visible{};
+  /// Where its edges are, in pixels, clamped to [0, size - 1] (rows from the top), and the depth of
+  /// its nearest point (reverse-Z). 0 where it is visible whatever they are.
+  T left{}, right{}, top{}, bottom{}, depth{};
+  auto scalars() { return std::tie(visible, left, right, top, bottom, depth); }
+};
+
+/// More pixels never make a sphere less visible (their texels are inside those of fewer pixels,
+/// whose farthest depth is no nearer), so an uncertain rectangle is visible for sure where its
+/// smallest form is, and hidden for sure where its largest is.
+template <class T>
+Sight<T> sightOf(const Camera& camera, const Bounds& sphere, const Occlusion& push,
+                 const Pyramid& pyramid);
+
 template <class T>
 T unoccluded(const Camera& camera, const Bounds& sphere, const Occlusion& push,
-             const Pyramid& pyramid);
+             const Pyramid& pyramid) {
+  return sightOf<T>(camera, sphere, push, pyramid).visible;
+}
 
 }  // namespace gnomon::culling

@@ -28,7 +28,7 @@ struct Edit {
 /// A kernel of the project's with some text replaced, or optimised, or one of data/kernels.
 struct Variant {
   std::string name, kernel, verdict, adapter;
-  std::string probe;           ///< the intermediate that the message must name; empty: any, or none
+  std::string probe;  ///< the intermediate that the message must name; empty: any, or none
   nlohmann::json conventions{};  ///< that an adapter around it declares; null: it has none
   bool optimise = false;
   std::vector<Edit> edits;

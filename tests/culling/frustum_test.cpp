@@ -64,15 +64,23 @@ class FrustumCase : public ListCase {
     }
   }
 
-  /// A thread then asks more than one group.
+  /// A thread then asks more than one group, with what is left of its patience.
   void moreBlocksThanThreadsAreListed() {
     widthDoesNotMatter();
-    const std::size_t n = (kGroupSize + 2) * kBlock + 1;
-    const std::vector<bool> kept = quicklyVisible(frustumInput(box(), everyThird(n)));
-    std::size_t wrong = 0;
-    for (std::size_t i = 0; i < n; ++i) wrong += kept[i] != (i % 3 == 0);
-    EXPECT_EQ(wrong, 0u) << "of " << n << " objects";
-    checked(n);
+    const FrustumInput input = frustumInput(box(), everyThird(kMoreThanThreads));
+    expectEveryThird(visible(input));
+    expectAnswers(input);
+  }
+
+  /// As a host starts that does not know how many objects there will be.
+  void groupsWithoutABlockDoNothing() {
+    widthDoesNotMatter();
+    for (const std::size_t n : {std::size_t{0}, std::size_t{kBlock}, kBlock + std::size_t{1}}) {
+      FrustumInput input = frustumInput(box(), everyThird(n));
+      input.idleGroups = 3;
+      expectRightList(input);
+      expectRightTally(input);
+    }
   }
 
   void groupsThatAskAreAnswered() { expectAnswers(frustumInput(box(), everyThird(3 * kBlock))); }
@@ -124,6 +132,8 @@ TEST_F(CullingFrustumSubgroups, MoreBlocksThanThreadsAreListed) {
   moreBlocksThanThreadsAreListed();
 }
 
+TEST_F(CullingFrustum, GroupsWithoutABlockDoNothing) { groupsWithoutABlockDoNothing(); }
+
 TEST_F(CullingFrustum, GroupsThatAskAreAnswered) {
   widthDoesNotMatter();
   groupsThatAskAreAnswered();
@@ -170,7 +180,9 @@ TEST_F(CullingFrustum, CastersBeforeTheNearPlaneCountWhereAskedFor) {
 TEST_F(CullingFrustum, BadBoundsAreVisible) {
   widthDoesNotMatter();
   std::vector<Bounds> all;
-  for (const float x : specialFloats({kMostWorld, -kMostWorld, 2 * kMostWorld, -1.0f, 50.0f})) {
+  const float more = std::nextafter(kMostWorld, 2 * kMostWorld);
+  for (const float x :
+       specialFloats({kMostWorld, -kMostWorld, more, -more, 2 * kMostWorld, -1.0f, 50.0f})) {
     all.push_back({{x, 50, -5}, 1});
     all.push_back({{50, x, -5}, 1});
     all.push_back({{50, 0, x}, 1});

@@ -49,12 +49,14 @@ std::string describe(const DepthBuffer& depths, const PyramidShape& shape, const
 
 }  // namespace
 
+// Sky pixels here and there would make every texel of the upper levels 0.
 DepthBuffer generatedDepths(const uvec2& size, std::uint64_t seed) {
   Random random(seed);
   DepthBuffer buffer{.size = size};
-  for (std::size_t i = 0; i < std::size_t{size.x} * size.y; ++i)
-    buffer.depths.push_back(random.chance(0.05) ? 0.0f
-                                                : static_cast<float>(random.logUniform(1e-4, 1)));
+  for (uint y = 0; y < size.y; ++y)
+    for (uint x = 0; x < size.x; ++x)
+      buffer.depths.push_back(y < size.y / 20 ? 0.0f
+                                              : static_cast<float>(random.logUniform(1e-4, 1)));
   return buffer;
 }
 

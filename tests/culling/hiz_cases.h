@@ -15,7 +15,7 @@ namespace gnomon::culling {
 /// Elements of `levels`, rows from the top.
 using Pyramid = std::vector<std::vector<float>>;
 
-/// Depths as a frame has them, log-uniform over four decades; one in twenty is sky.
+/// Depths as a frame has them, log-uniform over four decades; the upper twentieth is sky.
 DepthBuffer generatedDepths(const uvec2& size, std::uint64_t seed);
 
 /// A buffer of one depth.

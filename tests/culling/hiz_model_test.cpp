@@ -87,10 +87,16 @@ TEST(CullingHizModel, AConstantStaysConstant) {
     EXPECT_EQ(farthest(depths, footprint(depths.size, level, uvec2(0))), 0.375);
 }
 
+// Whichever pixel it is at.
 TEST(CullingHizModel, TheTopIsTheGlobalMinimum) {
   const DepthBuffer depths = generatedDepths({21, 13}, caseSeed());
-  EXPECT_EQ(farthest(depths, footprint(depths.size, levelCount(depths.size), uvec2(0))),
-            *std::ranges::min_element(depths.depths));
+  const Footprint all = footprint(depths.size, levelCount(depths.size), uvec2(0));
+  EXPECT_EQ(farthest(depths, all), *std::ranges::min_element(depths.depths));
+  for (std::size_t i = 0; i < depths.depths.size(); ++i) {
+    DepthBuffer lowered = constantDepths(depths.size, 0.75f);
+    lowered.depths[i] = 0.5f;
+    EXPECT_EQ(farthest(lowered, all), 0.5) << "pixel " << i;
+  }
 }
 
 // Wherever the pixel is, it alone decides, and only in the texel that covers it.

@@ -153,6 +153,13 @@ std::vector<float> mipsOf(const Pyramid& pyramid) {
   return texels;
 }
 
+/// Draws that do not know which object they are of: the kernel has to say.
+std::vector<DrawCommand> unnumbered(std::size_t objects) {
+  std::vector<DrawCommand> commands = commandsFor(objects);
+  for (DrawCommand& c : commands) c.firstInstance = ~c.firstInstance;
+  return commands;
+}
+
 }  // namespace
 
 FrustumInput frustumInput(const Camera& camera, std::vector<Bounds> bounds, float pad) {
@@ -160,7 +167,7 @@ FrustumInput frustumInput(const Camera& camera, std::vector<Bounds> bounds, floa
   return {.camera = {camera},
           .bounds = std::move(bounds),
           .push = {.count = n, .capacity = n, .noNearPlane = 0, .pad = pad, .patience = kPatience},
-          .commands = commandsFor(n)};
+          .commands = unnumbered(n)};
 }
 
 void parts(Parts& p, FrustumInput& input) {
@@ -204,14 +211,14 @@ bool admits(const OcclusionInput& input) {
 
 FrustumStimulus::FrustumStimulus(FrustumInput& input) {
   if (input.commands.size() != input.bounds.size())
-    input.commands = commandsFor(input.bounds.size());
+    input.commands = unnumbered(input.bounds.size());
   stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
                          {"bounds", std::as_bytes(std::span(input.bounds))},
                          {"commands", std::as_bytes(std::span(input.commands))}},
               .outputs = {{"draws", input.push.capacity, /*list=*/true}, {"tally", 1}},
               .scratch = {{"scratch", kBlocks + blocksOf(input.bounds.size())}},
               .push = std::as_bytes(std::span(&input.push, 1)),
-              .extent = {input.bounds.size()}};
+              .extent = {input.bounds.size() + std::size_t{input.idleGroups} * kBlock}};
 }
 
 OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
@@ -223,8 +230,11 @@ OcclusionStimulus::OcclusionStimulus(OcclusionInput& input)
   const std::vector<DrawCommand> unfound(input.behind, {36, 1, 0, 0, 0});
   given = survivors;
   given.insert(given.end(), unfound.begin(), unfound.end());
-  found = {
-      {.tested = input.push.objects, .total = n, .listed = n, .overflowed = 0, .recounted = 0}};
+  found = {{.tested = input.push.objects,
+            .total = n + input.behind + input.lacking,
+            .listed = n + input.lacking,
+            .overflowed = input.behind > 0,
+            .recounted = 0}};
   const uvec2 size = max(input.push.size / 2u, uvec2(1));
   const auto mips = static_cast<unsigned>(std::max<std::size_t>(pyramid.levels.size() - 1, 1));
   stimulus = {.inputs = {{"camera", std::as_bytes(std::span(input.camera))},
@@ -323,6 +333,13 @@ void ListCase::expectAnswersTo(const Stimulus& stimulus) {
   checked(1);
 }
 
+void ListCase::expectEveryThird(const std::vector<bool>& kept) {
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < kept.size(); ++i) wrong += kept[i] != (i % 3 == 0);
+  EXPECT_EQ(wrong, 0u) << "of " << kept.size() << " candidates";
+  checked(kept.size());
+}
+
 std::vector<bool> ListCase::visible(FrustumInput input) {
   const Observation seen = judged(input).seen;
   expectClean(seen);
@@ -344,8 +361,17 @@ std::vector<bool> ListCase::readList(const std::map<std::string, std::vector<std
   const auto draws = elementsOf<DrawCommand>(outputs.at("draws"));
   const auto tally = elementsOf<Tally>(outputs.at("tally"));
   std::vector<bool> all(candidates);
-  for (std::size_t i = 0; i < std::min<std::size_t>(tally[0].listed, draws.size()); ++i)
-    if (const std::size_t c = draws[i].firstInstance / stride; c < candidates) all[c] = true;
+  std::size_t next = 0;  // the first candidate that may follow
+  for (std::size_t i = 0; i < std::min<std::size_t>(tally[0].listed, draws.size()); ++i) {
+    const std::size_t c = draws[i].firstInstance / stride;
+    if (c < next || c >= candidates) {
+      ADD_FAILURE() << "draws[" << i << "] is of candidate " << c << " of " << candidates
+                    << ", behind that of candidate " << next - 1;
+      break;
+    }
+    all[c] = true;
+    next = c + 1;
+  }
   return all;
 }
 

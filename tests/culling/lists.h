@@ -10,12 +10,13 @@
 
 namespace gnomon::culling {
 
-/// What frustum is given.
+/// What frustum is given, and groups beyond those that have a block.
 struct FrustumInput {
   std::vector<Camera> camera{};  ///< one
   std::vector<Bounds> bounds{};
   Frustum push{0, 0, 0, 0, kPatience};
   std::vector<DrawCommand> commands{};  ///< follow from the number of bounds
+  uint idleGroups = 0;
 };
 
 /// As many draws fit as there are objects.
@@ -24,13 +25,14 @@ void parts(Parts& p, FrustumInput& input);
 bool admits(const FrustumInput& input);
 
 /// What occlusion is given: every `stride`-th object is a survivor of the frustum. Behind the list
-/// of survivors there may be draws that nobody has found.
+/// of survivors there may be draws that nobody has listed, as where the list was full; and the
+/// frustum may have listed more than there is room for.
 struct OcclusionInput {
   std::vector<Camera> camera{};  ///< one
   std::vector<Bounds> bounds{};
   Picture depth{};
   Occlusion push{{1, 1}, 0, 0, 0, 0, kPatience};
-  uint stride = 1, behind = 0;
+  uint stride = 1, behind = 0, lacking = 0;
 };
 
 OcclusionInput occlusionInput(const Camera& camera, std::vector<Bounds> bounds, Picture depth,
@@ -58,6 +60,9 @@ class OcclusionStimulus {
   std::vector<DrawCommand> given;  ///< the survivors, and what is behind them
   std::vector<float> levels;
 };
+
+/// Candidates of more blocks than a group has threads, the last block with one.
+constexpr std::size_t kMoreThanThreads = (kGroupSize + 2) * std::size_t{kBlock} + 1;
 
 /// The fixture of all four entries. "visible" is the output of an observation that says for every
 /// candidate whether it is listed.
@@ -88,6 +93,9 @@ class ListCase : public KernelCase {
   /// group may be kept waiting while the machine does something else, but not always.
   void expectAnswers(FrustumInput input);
   void expectAnswers(OcclusionInput input);
+
+  /// That each third candidate, from the first on, is visible and no other.
+  void expectEveryThird(const std::vector<bool>& kept);
 
   /// What is visible, for laws: findings of hygiene fail the case.
   std::vector<bool> visible(FrustumInput input);

@@ -1,6 +1,7 @@
 // The model of culling/occlusion against truth. No GPU.
 //
-// Covered: tangents against the slopes of a circle's points, and against printed widths; levels and
+// Covered: tangents against the slopes of a circle's points, and against printed widths; edges and
+// depth of spheres against projected points of theirs; exact limits of the rules; levels and
 // texels of a query against the pixels they have to cover; nothing that a ray sees is hidden, over
 // generated scenes of every kind; walls that hide everything; a screen without occluders; the share
 // of hidden objects that is found. Not covered: the pyramid itself (hiz).
@@ -18,6 +19,7 @@
 #include "reference/bound/explore.h"
 #include "reference/culling/frustum.h"
 #include "reference/culling/occlusion.h"
+#include "tests/culling/lists.h"
 #include "tests/culling/scenes.h"
 
 namespace gnomon::culling {
@@ -42,11 +44,16 @@ Occlusion pushFor(const Scene& scene) {
           .patience = kPatience};
 }
 
+Sight<double> sight(const Scene& scene, const Bounds& sphere, const Pyramid& pyramid) {
+  const char* entry = scene.perspective() ? "sightOf" : "sightOf.orthographic";
+  const Sight<double> found = modelled(
+      entry, [&]<class T>() { return sightOf<T>(scene.camera, sphere, pushFor(scene), pyramid); });
+  EXPECT_TRUE(found.visible == 0 || found.visible == 1);
+  return found;
+}
+
 bool visible(const Scene& scene, const Bounds& sphere, const Pyramid& pyramid) {
-  const char* entry = scene.perspective() ? "unoccluded" : "unoccluded.orthographic";
-  return modelled(entry, [&]<class T>() {
-           return unoccluded<T>(scene.camera, sphere, pushFor(scene), pyramid);
-         }) == 1;
+  return sight(scene, sphere, pyramid).visible == 1;
 }
 
 bool visible(const Scene& scene, const Bounds& sphere) {
@@ -84,6 +91,52 @@ TEST(CullingOcclusionModel, TangentsAreTheSteepestSlopesOfTheSphere) {
     EXPECT_NEAR(found.most, steepest(c, d, r), 1e-12 * (1 + std::abs(found.most)));
     EXPECT_NEAR(found.least, -steepest(-c, d, r), 1e-12 * (1 + std::abs(found.least)));
   }
+}
+
+/// Where a point of clip space, from -1 to 1, is in pixels, clamped to the screen.
+double pixel(double clip, uint size) { return std::clamp((clip + 1) / 2 * size, 0.0, size - 1.0); }
+
+/// A sphere's edges and nearest depth by the whole projection, of points on it that are found
+/// without the model's tangents.
+Sight<double> projected(const Scene& scene, const Bounds& sphere) {
+  const dmat4 p(scene.camera.projection);
+  const dvec3 c(dmat4(scene.camera.view) * glm::dvec4(sphere.centre, 1));
+  const double r = double{sphere.radius} + double{scene.pad};
+  const auto at = [&](const dvec3& point) {
+    const glm::dvec4 clip = p * glm::dvec4(point, 1);
+    return dvec3(clip) / clip.w;
+  };
+  const auto edge = [&](int axis, double side) {
+    dvec3 point(0, 0, -1);
+    point[axis] =
+        scene.perspective() ? side * steepest(side * c[axis], -c.z, r) : c[axis] + side * r;
+    return pixel(at(point)[axis], scene.size[axis]);
+  };
+  const auto [left, right] = std::minmax({edge(0, -1), edge(0, 1)});
+  const auto [top, bottom] = std::minmax({edge(1, -1), edge(1, 1)});
+  return {0, left, right, top, bottom, at({0, 0, c.z + r}).z};
+}
+
+// Under every projection, on the screen, on its edges and beyond them.
+TEST(CullingOcclusionModel, EdgesAndDepthAreThoseOfProjectedPoints) {
+  std::size_t judged = 0;
+  forEachScene(4, [&](const Scene& scene) {
+    const Pyramid pyramid = pyramidOf(scene.depth);
+    for (const Bounds& sphere : spheresAround(scene, 40, caseSeed())) {
+      const Sight<double> found = sight(scene, sphere, pyramid);
+      if (found.depth == 0) continue;  // it is before the near plane
+      const Sight<double> expected = projected(scene, sphere);
+      ++judged;
+      // A search knows a slope to 1e-12, and centres a million units away cancel to 1e-9.
+      constexpr double kClose = 1e-6;
+      EXPECT_NEAR(found.left, expected.left, kClose) << nameOf(scene.kind);
+      EXPECT_NEAR(found.right, expected.right, kClose) << nameOf(scene.kind);
+      EXPECT_NEAR(found.top, expected.top, kClose) << nameOf(scene.kind);
+      EXPECT_NEAR(found.bottom, expected.bottom, kClose) << nameOf(scene.kind);
+      EXPECT_NEAR(found.depth, expected.depth, kClose) << nameOf(scene.kind);
+    }
+  });
+  EXPECT_GT(judged, std::size_t{12} * 4 * 40 / 2);
 }
 
 // How much of the true width the naive 2 r / d covers; numbers computed elsewhere, to the digits
@@ -241,11 +294,15 @@ TEST(CullingOcclusionModel, WhatReachesBeforeTheNearPlaneIsVisible) {
   EXPECT_TRUE(visible(scene, {{2.0f * kSteepest, 0, -1.0f}, 0.25f}));
 }
 
-/// Of the things of those scenes that no pixel shows and no plane culls, the share that is hidden.
-double hiddenShare(SceneKind kind, std::size_t scenes) {
+// What the algorithm finds of what is hidden depends on the scenes: of these, which are the same
+// for every --seed and --cases, it is on record, so that a change of the rules shows.
+TEST(CullingOcclusionModel, TheShareOfHiddenThingsFoundIsAsRecorded) {
+  constexpr std::uint64_t kFirst = 1;
+  const Policy& policy = Session::current().policy();
+  const auto scenes = static_cast<std::uint64_t>(policy["cullingScenes"]) / kSceneKinds;
   std::size_t hidden = 0, found = 0;
-  for (std::size_t s = 0; s < scenes; ++s) {
-    const Scene scene = generatedScene(kind, caseSeed() + s);
+  for (std::uint64_t s = kFirst; s < kFirst + scenes; ++s) {
+    const Scene scene = generatedScene(SceneKind::kOccluders, s);
     const Pyramid pyramid = pyramidOf(scene.depth);
     for (std::size_t i = 0; i < scene.things.size(); ++i) {
       const Frustum push{0, 0, 0, scene.pad, 0};
@@ -254,15 +311,41 @@ double hiddenShare(SceneKind kind, std::size_t scenes) {
       found += !visible(scene, scene.bounds[i], pyramid);
     }
   }
-  return static_cast<double>(found) / static_cast<double>(hidden);
+  // Three digits are recorded; another libm may decide two or three things otherwise.
+  EXPECT_NEAR(static_cast<double>(found) / static_cast<double>(hidden),
+              policy["cullingHiddenShare"], 0.002)
+      << found << " of " << hidden;
 }
 
-// What the algorithm finds of what is hidden depends on the scenes; it is on record so that a
-// change of the rules shows.
-TEST(CullingOcclusionModel, TheShareOfHiddenThingsFoundIsAsRecorded) {
-  const auto recorded = Session::current().policy()["cullingHiddenShare"];
-  const double share = hiddenShare(SceneKind::kOccluders, scenesOfEachKind());
-  EXPECT_NEAR(share, recorded, 0.02);
+// On exact numbers: a depth that is the sphere's own does not hide it, the next one does.
+TEST(CullingOcclusionModel, ADepthThatIsTheSpheresOwnDoesNotHideIt) {
+  for (const bool perspective : {false, true}) {
+    // Depth at distance 8: 1/16, and (16.5 - 8) / 16.
+    const Scene flat = before(orthographic(-8, 8, -8, 8, 0.5, 16.5), {16, 16}, 8.5f / 16);
+    const Scene deep = before(culling::perspective(1.2, 1.5, 0.5), {16, 16}, 1 / 16.0f);
+    const Scene& scene = perspective ? deep : flat;
+    const Pyramid pyramid = pyramidOf(scene.depth);
+    EXPECT_TRUE(visible(scene, {{0.5f, 0.5f, -9}, 1}, pyramid));
+    EXPECT_FALSE(visible(scene, {{0.5f, 0.5f, -9.0009765625f}, 1}, pyramid));
+  }
+}
+
+// Of a parallel projection nothing is too far to the side.
+TEST(CullingOcclusionModel, FarToTheSideIsVisibleInPerspectiveAlone) {
+  const Scene scene = before(perspective(1.2, 1.5, 0.5), {64, 48}, 1);
+  const Pyramid pyramid = pyramidOf(scene.depth);
+  for (const float side : {-1.0f, 1.0f})
+    for (const int axis : {0, 1}) {
+      const auto at = [&](float distance) {
+        vec3 centre(0, 0, -1);
+        centre[axis] = side * distance;
+        return Bounds{centre, 0.25f};
+      };
+      EXPECT_FALSE(visible(scene, at(kSteepest), pyramid));
+      EXPECT_TRUE(visible(scene, at(kSteepest + 1), pyramid));
+      const Scene flat = before(orthographic(-9, 5, -3, 4, 0.5, 16), {61, 33}, 1);
+      EXPECT_FALSE(visible(flat, at(kSteepest + 1)));
+    }
 }
 
 // The interval holds the double, and is one number wherever rounding does not decide.

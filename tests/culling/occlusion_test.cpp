@@ -88,6 +88,17 @@ class OcclusionCase : public ListCase {
     }
   }
 
+  /// A thread then asks more than one group. Every third object is before a wall at distance 8.
+  void moreBlocksThanThreadsAreListed() {
+    widthDoesNotMatter();
+    std::vector<Bounds> all;
+    for (std::size_t i = 0; i < kMoreThanThreads; ++i)
+      all.push_back({{0, 0, i % 3 == 0 ? -4.0f : -50.0f}, 1});
+    const OcclusionInput input = occlusionInput(eye(), all, filled({61, 43}, 1 / 16.0f));
+    expectEveryThird(visible(input));
+    expectAnswers(input);
+  }
+
   void blocksAreCountedByWhoeverAsksNobody() {
     OcclusionInput input = anyInput(3 * kBlock + 1, {61, 43}, caseSeed());
     input.push.patience = 0;
@@ -127,6 +138,11 @@ TEST_F(CullingOcclusion, BlocksAreCountedByWhoeverAsksNobody) {
 }
 TEST_F(CullingOcclusionSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
+}
+
+TEST_F(CullingOcclusion, MoreBlocksThanThreadsAreListed) { moreBlocksThanThreadsAreListed(); }
+TEST_F(CullingOcclusionSubgroups, MoreBlocksThanThreadsAreListed) {
+  moreBlocksThanThreadsAreListed();
 }
 
 TEST_F(CullingOcclusion, GroupsThatAskAreAnswered) {
@@ -191,6 +207,15 @@ TEST_F(CullingOcclusion, DrawsBehindTheListAreNotLookedAt) {
   }
 }
 
+TEST_F(CullingOcclusion, NoMoreIsReadThanThereIsRoomFor) {
+  widthDoesNotMatter();
+  OcclusionInput input = anyInput(100, {61, 43}, caseSeed());
+  input.lacking = 7;
+  input.push.capacity = kBlock;
+  expectRightList(input);
+  expectRightTally(input);
+}
+
 // Six units of numbers that code treats wrongly, in every place.
 TEST_F(CullingOcclusion, BadBoundsAreVisible) {
   widthDoesNotMatter();
@@ -226,6 +251,72 @@ TEST_F(CullingOcclusion, BadDepthsHideNothing) {
     all.push_back({{at, at, -2}, 0.25f});
   }
   expectRightList(occlusionInput(camera, all, depth));
+}
+
+// On exact numbers: depth is (65 - distance) / 64, which the sphere has at 33.
+TEST_F(CullingOcclusion, ADepthThatIsTheSpheresOwnDoesNotHideIt) {
+  widthDoesNotMatter();
+  std::vector<Bounds> all;
+  for (const float off : {-0x1p-10f, 0.0f, 0x1p-10f})
+    all.push_back({{20, 20, -33.25f + off}, 0.25f});
+  expectRightList(occlusionInput(flat(), all, filled({64, 64}, 0.5f)));
+}
+
+// Depths of 2^-16, before what is at 5e-5 and behind it, and in pixels whose depth is bad.
+TEST_F(CullingOcclusion, TheSmallestDepthsHideToo) {
+  widthDoesNotMatter();
+  Picture depth = filled({64, 64}, 5e-5f);
+  const std::vector<float> bad = {-1, std::numeric_limits<float>::quiet_NaN()};
+  std::vector<Bounds> all;
+  for (uint x = 0; x < 64; ++x) {
+    if (x % 3 < 2) depth.texels[std::size_t{20} * 64 + x].x = bad[x % 3];
+    const float at = static_cast<float>(x) + 0.5f;
+    for (const float nearest : {65 - 0x1p-10f, 65 - 0x1p-7f})
+      all.push_back({{at, 20.5f, -nearest - 0.25f}, 0.25f});
+  }
+  expectRightList(occlusionInput(flat(), all, depth));
+}
+
+// At the limit of perspective, a unit beyond it, and where there is none.
+TEST_F(CullingOcclusion, FarToTheSideIsVisibleInPerspectiveAlone) {
+  widthDoesNotMatter();
+  std::vector<Bounds> all;
+  for (const float side : {-kSteepest, kSteepest, -kSteepest - 1, kSteepest + 1}) {
+    all.push_back({{side, 0, -1}, 0.25f});
+    all.push_back({{0, side, -1}, 0.25f});
+    all.push_back({{3 * side, 20, -2}, 0.25f});
+  }
+  for (const Camera& camera : {eye(), flat()})
+    expectRightList(occlusionInput(camera, all, filled({64, 64}, 1)));
+}
+
+// A world of a hundred-thousandth: left of the axis is the wall, right of it the sky.
+TEST_F(CullingOcclusion, TheSmallestSpheresAreOnTheirOwnSideOfTheAxis) {
+  widthDoesNotMatter();
+  const Camera tiny = cameraOf(glm::dmat4(1), perspective(1.2, 1, 1e-6), 1e-6);
+  Picture depth = filled({64, 64}, 0);
+  for (std::size_t i = 0; i < depth.pixels(); ++i)
+    depth.texels[i].x = i % 64 < 32 || i / 64 < 32 ? 0.5f : 0.0f;
+  std::vector<Bounds> all;
+  for (const float x : {-1.3e-6f, 1.3e-6f})
+    for (const float y : {-1.3e-6f, 1.3e-6f}) all.push_back({{x, y, -5e-6f}, 1e-8f});
+  expectRightList(occlusionInput(tiny, all, depth));
+}
+
+// Of each pixel one sphere: those at odd places are behind their own pixel's depth, and every pixel
+// beside one of them is sky.
+TEST_F(CullingOcclusion, EveryPixelIsFoundByTheSphereInIt) {
+  widthDoesNotMatter();
+  Picture depth = filled({64, 64}, 0);
+  std::vector<Bounds> all;
+  for (uint y = 0; y < 64; ++y)
+    for (uint x = 0; x < 64; ++x) {
+      if ((x + y) % 2 == 1) depth.texels[std::size_t{y} * 64 + x].x = 0.5f;
+      // From edge to edge, but for the last 2^-10 of the right and lower one, which is the next's.
+      const float r = 0.5f - 0x1p-11f;
+      all.push_back({{static_cast<float>(x) + r, static_cast<float>(y) + r, -50}, r});
+    }
+  expectRightList(occlusionInput(flat(), all, depth));
 }
 
 // Behind the wall at distance 8, before it, through it, and where it has a hole of one pixel.

@@ -236,7 +236,10 @@ bool communicate(Gpu& gpu, const SpirvWords& module) {
       .push = {},
       .features = {"scalarBlockLayout"}};
   const Subject subject(gpu, record, {.words = module, .origin = "map.comp"});
-  EXPECT_EQ(subject.orderTwin() != nullptr, subject.threadsCommunicate());
+  if (subject.threadsCommunicate())
+    EXPECT_NO_THROW(subject.orderTwin());
+  else
+    EXPECT_THROW(subject.orderTwin(), std::logic_error);
   return subject.threadsCommunicate();
 }
 

@@ -500,10 +500,9 @@ TEST_F(ImageHygiene, ASamplerOfItsOwnSamplesAnImage) {
 TEST_F(ImageHygiene, AKernelMayFetchWhereTheContractHasASampler) {
   const ImageSpec sampler{
       .name = "nearest", .binding = 1, .access = Access::kRead, .type = "sampler"};
-  const auto got = readBack(
-      {source("texture2D"), sampler},
-      inputOf({.format = PixelFormat::kR32f, .width = 2}, counting(2)),
-      reader(counted(2, kFetched), "texelFetch(source, ivec2(i, 0), 0)"), 2);
+  const auto got = readBack({source("texture2D"), sampler},
+                            inputOf({.format = PixelFormat::kR32f, .width = 2}, counting(2)),
+                            reader(counted(2, kFetched), "texelFetch(source, ivec2(i, 0), 0)"), 2);
   expectNumbers(got, {0, 1});
 }
 
