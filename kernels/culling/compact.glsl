@@ -14,10 +14,10 @@
 
 const uint kWords = kBlock / 32;
 const uint kPerThread = kBlock / kGroupSize;
-shared uint visible[kWords];  // a bit a candidate
 shared uint blockOfGroup;
-shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
+shared uint visible[kWords];          // a bit a candidate
 shared uint visibleBefore;            // the block
+shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
 shared bool isLastGroup;
 
 bool isVisible(uint candidate);
@@ -100,13 +100,25 @@ void sumUp(uint candidates, uint capacity) {
   tally[0].recounted = scratch[kRecounted];
 }
 
-/// The last group of all sums up and leaves the scratch as it was: zero.
-void finish(uint lane, uint candidates, uint capacity) {
-  memoryBarrierBuffer();
-  barrier();
+/// Visible candidates up to the end of the group's block; 0 of a group without one.
+uint visibleSoFar(uint lane, uint candidates, uint capacity, uint patience) {
+  if (blockOfGroup >= blocksOf(candidates)) return 0;  // the host may not know how many there are
+  markVisible(lane, candidates);
+  publish(lane);
+  askOthers(lane, patience);
+  listBlock(lane, capacity);
+  return visibleBefore + visibleUpTo[kWords];
+}
+
+/// The last group of all sums up and leaves the scratch as it was: zero. What is visible up to a
+/// block only grows with it, so the largest number said is all.
+void finish(uint lane, uint soFar, uint candidates, uint capacity) {
+  controlBarrier(gl_ScopeWorkgroup, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+                 gl_SemanticsAcquireRelease);
   if (isFirstThread()) {
-    isLastGroup = atomicAdd(scratch[kFinished], 1u) == gl_NumWorkGroups.x - 1;
-    memoryBarrierBuffer();
+    atomicMax(scratch[kTotal], soFar);
+    isLastGroup = atomicAdd(scratch[kFinished], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+                            gl_SemanticsAcquireRelease) == gl_NumWorkGroups.x - 1;
     if (isLastGroup) sumUp(candidates, capacity);
   }
   barrier();
@@ -117,13 +129,5 @@ void finish(uint lane, uint candidates, uint capacity) {
 void compact(uint candidates, uint capacity, uint patience) {
   const uint lane = gl_LocalInvocationIndex;
   takeBlock(lane);
-  if (blockOfGroup < blocksOf(candidates)) {  // the host may not know how many there are
-    markVisible(lane, candidates);
-    publish(lane);
-    askOthers(lane, patience);
-    listBlock(lane, capacity);
-    // What is visible up to a block only grows with it: the last one's is all.
-    if (isFirstThread()) atomicMax(scratch[kTotal], visibleBefore + visibleUpTo[kWords]);
-  }
-  finish(lane, candidates, capacity);
+  finish(lane, visibleSoFar(lane, candidates, capacity, patience), candidates, capacity);
 }

@@ -98,6 +98,7 @@ KernelRecord occlusion(std::string entry) {
       field("candidates", &Occlusion::candidates), field("capacity", &Occlusion::capacity),
       field("pad", &Occlusion::pad), field("patience", &Occlusion::patience));
   record.ownCode = {"culling/occlusion.glsl"};
+  record.mutates = false;  // TODO: its score is not on record yet
   record.summary = "spheres against the pyramid of depths; draws of what is not hidden, compacted";
   return record;
 }

@@ -27,7 +27,7 @@ struct Tally {      // of one dispatch; a host reads it some frames later
 // frustum: a candidate is visible unless its sphere, grown by `pad`, lies wholly outside one plane;
 // touching is visible. Its draw is commands[i] with firstInstance = i.
 // Bad input: bounds that are not finite, exceed kMostWorld in a number, or have a negative radius
-// make an object visible.
+// (-0 too) make an object visible.
 struct Frustum {     // push constants
   uint count;        // of bounds and commands
   uint capacity;     // of draws
@@ -108,7 +108,7 @@ const uint kHizDepth = 0;    // of hiz
 const uint kHizLevels = 1;   // image2D[kMaxLevels], R32F
 const uint kHizScratch = 2;  // uint: groups that are done, then a texel of level kHizTile a group
 const uint kHizNearest = 3;  // sampler: of the nearest texel
-const uint kMaxLevels = 15;  // of images up to 65535 pixels wide
+const uint kMaxLevels = 14;  // of images up to 32767 pixels a side
 const uint kHizTile = 6;     // a group makes one texel of this level, and all below it
 const uint kHizGroup = 256;
 

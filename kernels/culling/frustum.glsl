@@ -1,6 +1,5 @@
 // Frustum culling: spheres against planes, the draws of what is visible compacted in order.
 #include "culling.h"
-#include "../lib/safe.glsl"
 #include "bounds.glsl"
 
 layout(local_size_x = kGroupSize) in;

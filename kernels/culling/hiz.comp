@@ -7,6 +7,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_shader_image_load_formatted : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_memory_scope_semantics : require
 #include "culling.h"
 #include "../lib/thread.glsl"
 #include "hiz.glsl"
@@ -42,8 +43,8 @@ void store(uint level, uvec2 at, uint bits) {
   // clang-format off
 #define STORE(m) case m + 1: imageStore(levels[m], ivec2(at), texel); break;
   switch (level) {
-    STORE(0) STORE(1) STORE(2) STORE(3) STORE(4) STORE(5) STORE(6) STORE(7)
-    STORE(8) STORE(9) STORE(10) STORE(11) STORE(12) STORE(13) STORE(14)
+    STORE(0) STORE(1) STORE(2) STORE(3) STORE(4) STORE(5) STORE(6)
+    STORE(7) STORE(8) STORE(9) STORE(10) STORE(11) STORE(12) STORE(13)
   }
   // clang-format on
 }
@@ -60,16 +61,19 @@ uint load(uint level, uvec2 at) {
   return scratch[placeOf(level, at)];
 }
 
-uint least(uint a, uint b, uint c, uint d) { return min(min(a, b), min(c, d)); }
-
 // Of the 2 x 2 texels from `first` on, in one go. Of the depth buffer those around their corner.
 uint leastOfFour(uint level, uvec2 first) {
-  if (level > 0u)
-    return least(load(level, first), load(level, first + uvec2(1, 0)),
-                 load(level, first + uvec2(0, 1)), load(level, first + 1u));
-  const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
-  const vec4 depths = textureGather(sampler2D(depth, nearest), corner);
-  return least(depthBits(depths.x), depthBits(depths.y), depthBits(depths.z), depthBits(depths.w));
+  uvec4 four;
+  if (level == 0u) {
+    const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
+    four = depthBits(textureGather(sampler2D(depth, nearest), corner));
+  } else {
+    four.x = scratch[placeOf(level, first)];
+    four.y = scratch[placeOf(level, first + uvec2(1, 0))];
+    four.z = scratch[placeOf(level, first + uvec2(0, 1))];
+    four.w = scratch[placeOf(level, first + 1u)];
+  }
+  return min(min(four.x, four.y), min(four.z, four.w));
 }
 
 // A texel of level base + 1, of 2 x 2 texels of level base or, the last of a row or column, of more
@@ -77,7 +81,7 @@ uint leastOfFour(uint level, uvec2 first) {
 uint firstStep(uint base, uvec2 at) {
   const uvec2 begin = 2u * at, end = endOf(at, base + 1u, 1u);
   if (end == begin + 2u) return leastOfFour(base, begin);
-  uint farthest = kBeyondDepth;
+  uint farthest = load(base, begin);
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x) farthest = min(farthest, load(base, uvec2(x, y)));
   return farthest;
@@ -88,7 +92,7 @@ uint firstStep(uint base, uvec2 at) {
 uint sharedPlace(uvec2 local, uint step) { return (local.y * kPitch + local.x) << (step - 1u); }
 
 uint laterStep(uvec2 begin, uvec2 end, uint step) {
-  uint farthest = kBeyondDepth;
+  uint farthest = tileTexels[sharedPlace(begin, step - 1u)];
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x)
       farthest = min(farthest, tileTexels[sharedPlace(uvec2(x, y), step - 1u)]);
@@ -111,18 +115,19 @@ void reduce(uint base, uvec2 tile) {
         const uint texel = step == 1u ? firstStep(base, at) : laterStep(2u * local, end, step);
         store(base + step, at, texel);
         tileTexels[sharedPlace(local, step)] = texel;
+        if (step == kHizTile) scratch[placeOf(base + kHizTile, at)] = texel;
       }
   }
-  if (isFirstThread()) scratch[placeOf(base + kHizTile, tile)] = tileTexels[0];
 }
 
 // Whether all other groups have written their texels of level kHizTile.
 bool isLastGroup() {
-  if (isFirstThread()) {
-    memoryBarrierBuffer();
-    lastGroup = atomicAdd(scratch[0], 1u) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
-    memoryBarrierBuffer();
-  }
+  controlBarrier(gl_ScopeWorkgroup, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+                 gl_SemanticsAcquireRelease);
+  if (isFirstThread())
+    lastGroup =
+        atomicAdd(scratch[0], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+                  gl_SemanticsAcquireRelease) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
   barrier();
   return lastGroup;
 }
@@ -130,11 +135,11 @@ bool isLastGroup() {
 void main() {
   // Tiles of a round. Those that take a rest have most to do, so their groups start first.
   uvec2 first = gl_NumWorkGroups.xy - 1u - gl_WorkGroupID.xy, end = first + 1u;
-  for (uint base = 0u; base == 0u || base < lastLevel(); base += kHizTile) {
+  for (uint base = 0u; base < lastLevel(); base += kHizTile) {
     for (uint y = first.y; y < end.y; ++y)
       for (uint x = first.x; x < end.x; ++x) reduce(base, uvec2(x, y));
     if (base == 0u && !isLastGroup()) return;
-    memoryBarrierBuffer();  // the next round, behind its barrier, reads what thread 0 has written
+    memoryBarrierBuffer();  // the next round reads what this one has written, behind its barrier
     first = uvec2(0);
     end = sizeOf(base + 2u * kHizTile);
   }

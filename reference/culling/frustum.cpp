@@ -9,7 +9,7 @@ namespace gnomon::culling {
 bool isUsable(const Bounds& sphere) {
   const auto usable = [](float x) { return std::abs(x) <= kMostWorld; };  // NaN is not
   return usable(sphere.centre.x) && usable(sphere.centre.y) && usable(sphere.centre.z) &&
-         usable(sphere.radius) && sphere.radius >= 0;
+         usable(sphere.radius) && !std::signbit(sphere.radius);
 }
 
 template <class T>

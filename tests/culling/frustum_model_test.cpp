@@ -129,13 +129,17 @@ TEST(CullingFrustumModel, ASphereIsCulledOnceItLeavesTheFace) {
   });
 }
 
+// Each face of a box, on exact numbers: as far as the sphere reaches, and 2^-20 farther.
 TEST(CullingFrustumModel, TouchingIsVisible) {
-  Camera camera = cameraOf(dmat4(1), orthographic(-2, 2, -2, 2, 1, 9), 1);
-  const Bounds left{{-3, 0, -5}, 1};
-  EXPECT_TRUE(visible(camera, left));
-  EXPECT_FALSE(visible(camera, {{-3.0000002f, 0, -5}, 1}));
-  EXPECT_TRUE(visible(camera, {{-3.25f, 0, -5}, 1}, padded(0.25f)));
-  EXPECT_FALSE(visible(camera, {{-3.25f, 0, -5}, 1}, padded(0.125f)));
+  const Camera camera = cameraOf(dmat4(1), orthographic(-2, 2, -2, 2, 1, 9), 1);
+  for (const vec3& out : {vec3(-1, 0, 0), vec3(1, 0, 0), vec3(0, -1, 0), vec3(0, 1, 0),
+                          vec3(0, 0, 1), vec3(0, 0, -1)})
+    for (const float pad : {0.0f, 0.25f}) {
+      const vec3 face = vec3(0, 0, -5) + out * vec3(2, 2, 4);
+      const auto at = [&](float distance) { return Bounds{face + out * distance, 1}; };
+      EXPECT_TRUE(visible(camera, at(1 + pad), padded(pad)));
+      EXPECT_FALSE(visible(camera, at(1 + pad + 0x1p-20f), padded(pad)));
+    }
 }
 
 // Whatever the formula: a sphere with a point inside the clip volume is visible.
@@ -183,7 +187,7 @@ TEST(CullingFrustumModel, BadBoundsAreVisible) {
     EXPECT_EQ(visible(camera, {{x, 50, -5}, 1}), !usable) << x;
     EXPECT_EQ(visible(camera, {{50, x, -5}, 1}), !usable) << x;
     EXPECT_EQ(visible(camera, {{50, 0, x}, 1}), !usable) << x;
-    EXPECT_EQ(visible(camera, {{50, 0, -5}, x}), !(usable && x >= 0) || x > 48) << x;
+    EXPECT_EQ(visible(camera, {{50, 0, -5}, x}), !usable || std::signbit(x) || x > 48) << x;
   }
 }
 

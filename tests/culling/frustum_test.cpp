@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 
 #include "harness/cases/random.h"
@@ -189,6 +190,11 @@ TEST_F(CullingFrustum, BadBoundsAreVisible) {
     all.push_back({{50, 0, -5}, x});
   }
   expectRightList(frustumInput(box(), all));
+  // Along a diagonal a plane is farther away than any radius reaches that counts.
+  const glm::dmat4 turned = glm::rotate(glm::dmat4(1), 0.785398, glm::dvec3(0, 0, 1));
+  const Camera diagonal = cameraOf(turned, orthographic(-2, 2, -2, 2, 1, 9), 1);
+  const vec3 far(kMostWorld, kMostWorld, -5);
+  expectRightList(frustumInput(diagonal, {{far, kMostWorld}, {far, more}, {-far, more}}));
 }
 
 TEST_F(CullingFrustum, NothingThatARaySeesIsCulled) {

@@ -3,7 +3,7 @@
 // Covered: every texel to the bit, as in hiz_level_test.cpp, and here at sizes around a tile, with
 // tiles that take up to 127 pixels a side, and so many of them that the last group makes a second
 // round; an image without levels; scratch left as it was (hygiene). Frames were watched as small
-// images. Not covered: images beyond 65535 pixels a side.
+// images. Not covered: images beyond 16384 pixels a side.
 #include "tests/culling/hiz_cases.h"
 
 namespace gnomon::culling {
