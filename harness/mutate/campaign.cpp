@@ -157,9 +157,10 @@ class Campaign {
             .told = [this, &chunk](const std::string&, const std::string&) { settle(chunk); }};
   }
 
-  /// A mutant may hang: ten times what a case needs for the kernel itself is enough.
+  /// A mutant may hang: ten times what a case needs for the kernel itself is enough, and what it
+  /// takes to compile the mutant, which the case may have found compiled, on a busy machine.
   std::chrono::milliseconds patience(const std::string& name) const {
-    constexpr double kTimes = 10, kLeast = 2;
+    constexpr double kTimes = 10, kLeast = 15;
     const auto w = std::ranges::find(witnesses, name, [](const Witness& x) { return x.name.name; });
     const double seconds = w == witnesses.end() ? 0 : w->seconds;
     return std::min(

@@ -73,6 +73,7 @@ KernelRecord lister(std::string entry, const char* source, unsigned sourceBindin
   record.grid = aGroupForEveryBlock;
   record.features = {"scalarBlockLayout"};
   record.conventions = {{"keeps", {"exact", "more"}}};
+  record.mutates = false;  // TODO: its score is not on record yet
   return record;
 }
 
@@ -98,7 +99,6 @@ KernelRecord occlusion(std::string entry) {
       field("candidates", &Occlusion::candidates), field("capacity", &Occlusion::capacity),
       field("pad", &Occlusion::pad), field("patience", &Occlusion::patience));
   record.ownCode = {"culling/occlusion.glsl"};
-  record.mutates = false;  // TODO: its score is not on record yet
   record.summary = "spheres against the pyramid of depths; draws of what is not hidden, compacted";
   return record;
 }

@@ -63,17 +63,15 @@ uint load(uint level, uvec2 at) {
 
 // Of the 2 x 2 texels from `first` on, in one go. Of the depth buffer those around their corner.
 uint leastOfFour(uint level, uvec2 first) {
-  uvec4 four;
   if (level == 0u) {
     const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
-    four = depthBits(textureGather(sampler2D(depth, nearest), corner));
-  } else {
-    four.x = scratch[placeOf(level, first)];
-    four.y = scratch[placeOf(level, first + uvec2(1, 0))];
-    four.z = scratch[placeOf(level, first + uvec2(0, 1))];
-    four.w = scratch[placeOf(level, first + 1u)];
+    const vec4 four = textureGather(sampler2D(depth, nearest), corner);
+    return min(min(depthBits(four.x), depthBits(four.y)),
+               min(depthBits(four.z), depthBits(four.w)));
   }
-  return min(min(four.x, four.y), min(four.z, four.w));
+  return min(
+      min(scratch[placeOf(level, first)], scratch[placeOf(level, first + uvec2(1, 0))]),
+      min(scratch[placeOf(level, first + uvec2(0, 1))], scratch[placeOf(level, first + 1u)]));
 }
 
 // A texel of level base + 1, of 2 x 2 texels of level base or, the last of a row or column, of more
