@@ -89,7 +89,8 @@ void forSomeScenes(const F& f) {
       f(generatedScene(static_cast<SceneKind>(kind), caseSeed() + i));
 }
 
-// Each plane is rounded once: n by half an ULP of 1 at most in each component, d likewise.
+// Each plane is rounded once: by half an ULP, 2^-24 of a number up to 1 in each component of n, and
+// 2^-24 of its size in w; a corner's coordinates carry those on.
 TEST(CullingFrustumModel, PlanesHoldTheCornersOfTheFrustum) {
   forSomeScenes([](const Scene& scene) {
     for (const Face& face : facesOf(scene)) {
@@ -97,7 +98,7 @@ TEST(CullingFrustumModel, PlanesHoldTheCornersOfTheFrustum) {
       EXPECT_NEAR(glm::length(n), 1, std::sqrt(3) * 0x1p-24);
       for (const dvec3& p : face.on) {
         const double size = std::abs(p.x) + std::abs(p.y) + std::abs(p.z) + std::abs(face.plane.w);
-        EXPECT_NEAR(glm::dot(n, p) + face.plane.w, 0, size * 0x1p-23) << nameOf(scene.kind);
+        EXPECT_NEAR(glm::dot(n, p) + face.plane.w, 0, size * 0x1p-24) << nameOf(scene.kind);
       }
       EXPECT_GT(glm::dot(n, face.inside) + face.plane.w, 0) << nameOf(scene.kind);
     }
@@ -214,6 +215,7 @@ TEST(CullingFrustumModel, BoundsHoldWhatAnAffineTransformMakesOfTheSphere) {
   }
 }
 
+// A radius is rounded to a float, by half an ULP, and moved up by one: by 1.5 times 2^-23 in all.
 TEST(CullingFrustumModel, BoundsAreTightWhereAxesAreStretched) {
   Random random(caseSeed());
   for (int i = 0; i < 100; ++i) {
@@ -222,7 +224,7 @@ TEST(CullingFrustumModel, BoundsAreTightWhereAxesAreStretched) {
     const dmat4 m =
         glm::rotate(dmat4(1), random.uniform(0, 6), axis) * glm::scale(dmat4(1), stretch);
     const double most = std::max({std::abs(stretch.x), std::abs(stretch.y), std::abs(stretch.z)});
-    EXPECT_NEAR(boundsOf(m, dvec3(0), 2).radius, 2 * most, 2 * most * 0x1p-22);
+    EXPECT_NEAR(boundsOf(m, dvec3(0), 2).radius, 2 * most, 2 * most * 1.5 * 0x1p-23);
   }
 }
 

@@ -49,7 +49,8 @@ std::string describe(const DepthBuffer& depths, const PyramidShape& shape, const
 
 }  // namespace
 
-// Sky pixels here and there would make every texel of the upper levels 0.
+// Four decades: reverse-Z depths from a near plane to ten thousand times as far. Sky pixels here
+// and there would make every texel of the upper levels 0.
 DepthBuffer generatedDepths(const uvec2& size, std::uint64_t seed) {
   Random random(seed);
   DepthBuffer buffer{.size = size};
