@@ -262,12 +262,20 @@ std::string complaint(const ProcessResult& end) {
   return text;
 }
 
+std::string patienceInWords(const WorkerOptions& options, const std::string& running) {
+  const auto seconds = [](std::chrono::milliseconds t) {
+    return std::chrono::duration<double>(t).count();
+  };
+  if (options.limitOf && !running.empty())
+    return fmt::format("{:g} s", seconds(options.limitOf(running)));
+  return fmt::format("{:g} s (and {} s of grace)", seconds(options.limit), kGrace.count());
+}
+
 }  // namespace
 
 std::string WorkerReport::death(const WorkerOptions& options) const {
   if (process.end == ProcessResult::End::kTimedOut)
-    return fmt::format("did not end within {:g} s and {}",
-                       std::chrono::duration<double>(patience(options, running)).count(),
+    return fmt::format("did not end within {} and {}", patienceInWords(options, running),
                        process.status == 0 ? "was stopped" : "could not be stopped");
   std::string why = process.inWords();
   if (!process.errors.empty()) why += "; it said last:\n" + lastLines(process.errors);
