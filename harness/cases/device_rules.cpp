@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "harness/cases/cache.h"
+#include "harness/cache.h"
 #include "harness/error.h"
 
 namespace gnomon {

@@ -24,6 +24,7 @@ inline std::vector<float> specialFloats(std::initializer_list<float> ofTheStage 
                             Limits::min(),
                             -Limits::min(),
                             Limits::denorm_min(),
+                            std::bit_cast<float>(0x007fffffu),
                             Limits::max(),
                             Limits::lowest(),
                             Limits::infinity(),

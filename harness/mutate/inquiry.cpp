@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "harness/cases/cache.h"
+#include "harness/cache.h"
 #include "harness/cases/hash.h"
 #include "harness/error.h"
 #include "harness/mutate/model_campaign.h"

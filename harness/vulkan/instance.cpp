@@ -6,14 +6,21 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
 #include <string_view>
 
 #include <fmt/format.h>
 
+#include "harness/cache.h"
 #include "harness/error.h"
 
 namespace gnomon::vulkan {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
@@ -48,6 +55,39 @@ const char* resultName(VkResult result) {
       return nullptr;
   }
 #undef GNOMON_NAME
+}
+
+// Processors of one kind say the same here; empty where the system does not say.
+std::string processorFeatures() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line))
+    if (line.starts_with("flags") || line.starts_with("Features")) break;
+  return line;
+}
+
+// Mesa's software driver keeps machine code on disk by shader and driver, but for any processor and
+// vector width: a driver under test must not answer with what it made for another. So each has a
+// folder. A user's own folder holds, unless a process above has only set it for its own width.
+void separateShaderCaches() {
+  constexpr const char* kFolder = "MESA_SHADER_CACHE_DIR";
+  const fs::path ours = cacheFolder() / "shaders";
+  if (cacheFolder().empty()) {
+    setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
+    return;
+  }
+  const char* set = std::getenv(kFolder);
+  if (set != nullptr && fs::path(set).parent_path() != ours) return;
+  const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
+  const fs::path folder =
+      ours / fmt::format("{:016x}-{}", std::hash<std::string>{}(processorFeatures()),
+                         width == nullptr ? "own" : width);
+  std::error_code error;
+  fs::create_directories(folder, error);  // Mesa makes one folder, not those above it
+  if (error)
+    setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
+  else
+    setenv(kFolder, folder.c_str(), /*overwrite=*/1);
 }
 
 bool hasValidationLayer() {
@@ -153,9 +193,7 @@ void Instance::create(bool validation) {
     info.enabledExtensionCount = static_cast<std::uint32_t>(kExtensions.size());
     info.ppEnabledExtensionNames = kExtensions.data();
   }
-  // Mesa's cache on disk hands code of one vector width to a process of another: a driver under
-  // test must not answer with what another made.
-  setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
+  separateShaderCaches();
   const VkResult result = vkCreateInstance(&info, nullptr, &handle);
   if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return;  // the loader found no driver
   if (result != VK_SUCCESS) throw DeviceError(callFailed("vkCreateInstance", result));

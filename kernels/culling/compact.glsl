@@ -35,7 +35,7 @@ uint countAgain(uint block) {
 
 uint countOf(uint block, inout uint patience) {
   for (; patience > 0; --patience) {
-    const uint answer = atomicOr(scratch[kBlocks + block], 0u);
+    const uint answer = atomicLoad(scratch[kBlocks + block], gl_ScopeDevice, 0, 0);
     if (answer != 0) return answer - 1;
   }
   return countAgain(block);
@@ -65,7 +65,8 @@ void publish(uint lane) {
     uint before = 0;
     for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
     visibleUpTo[lane] = before;
-    if (lane == kWords) atomicExchange(scratch[kBlocks + blockOfGroup], before + 1);
+    if (lane == kWords)
+      atomicStore(scratch[kBlocks + blockOfGroup], before + 1, gl_ScopeDevice, 0, 0);
   }
   barrier();
 }
@@ -113,7 +114,7 @@ uint visibleSoFar(uint lane, uint candidates, uint capacity, uint patience) {
 /// The last group of all sums up and leaves the scratch as it was: zero. What is visible up to a
 /// block only grows with it, so the largest number said is all.
 void finish(uint lane, uint soFar, uint candidates, uint capacity) {
-  controlBarrier(gl_ScopeWorkgroup, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+  controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer,
                  gl_SemanticsAcquireRelease);
   if (isFirstThread()) {
     atomicMax(scratch[kTotal], soFar);

@@ -63,7 +63,8 @@ struct Occlusion {  // push constants
 // 2^L)) x max(1, floor(h / 2^L)) texels, down to 1 x 1. Texel x of it covers the columns [x 2^L, (x
 // + 1) 2^L), the last one to the end of the image; rows likewise; its value is the smallest depth
 // there, bit-exact. Element m of `levels` is level m + 1.
-// Bad input: a depth that is NaN, infinite or negative counts as 0, the farthest; -0 is 0.
+// Bad input: a depth that is NaN, infinite or negative counts as 0, the farthest; -0 is 0. So does
+// one below the smallest normal float, since a device may read a denormal as 0.
 struct Hiz {   // push constants
   uvec2 size;  // of the depth buffer, pixels
 };

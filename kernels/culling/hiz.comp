@@ -19,10 +19,10 @@ layout(set = 0, binding = kHizNearest) uniform sampler nearest;
 layout(set = 0, binding = kHizLevels) writeonly uniform image2D levels[kMaxLevels];
 layout(set = 0, binding = kHizScratch, scalar) coherent buffer Scratch { uint scratch[]; };
 
-// A tile has up to 63 texels a side of the first level that it makes: the last one of a row or
-// column takes the rest.
-const uint kPitch = (1u << kHizTile) - 1u;
-const uvec2 kThreads = uvec2(1u << (kHizTile - 1u), kHizGroup >> (kHizTile - 1u));
+// Of the second level that it makes a tile has a texel a thread, or up to 31 a side: the last tile
+// of a row or column takes the rest.
+const uint kSide = 1u << (kHizTile - 2u);
+const uint kPitch = 2u * kSide - 1u;
 shared uint tileTexels[kPitch * kPitch];
 shared bool lastGroup;
 
@@ -61,56 +61,74 @@ uint load(uint level, uvec2 at) {
   return scratch[placeOf(level, at)];
 }
 
-// Of the 2 x 2 texels from `first` on, in one go. Of the depth buffer those around their corner.
-uint leastOfFour(uint level, uvec2 first) {
-  if (level == 0u) {
-    const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
-    const vec4 four = textureGather(sampler2D(depth, nearest), corner);
-    return min(min(depthBits(four.x), depthBits(four.y)),
-               min(depthBits(four.z), depthBits(four.w)));
-  }
-  return min(
-      min(scratch[placeOf(level, first)], scratch[placeOf(level, first + uvec2(1, 0))]),
-      min(scratch[placeOf(level, first + uvec2(0, 1))], scratch[placeOf(level, first + 1u)]));
+// Of the 2 x 2 pixels from `first` on: those around their corner.
+uint leastOfFour(uvec2 first) {
+  const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
+  const vec4 four = textureGather(sampler2D(depth, nearest), corner);
+  return min(min(depthBits(four.x), depthBits(four.y)), min(depthBits(four.z), depthBits(four.w)));
 }
 
-// A texel of level base + 1, of 2 x 2 texels of level base or, the last of a row or column, of more
-// or fewer.
+// A texel of level 2 that is made of 4 x 4 pixels, and its four of level 1. All pixels are asked
+// for before the first is used: what this kernel takes is waiting for them.
+uint firstTwoSteps(uvec2 at) {
+  const uvec2 first = 4u * at;
+  const uvec4 four = uvec4(leastOfFour(first), leastOfFour(first + uvec2(2, 0)),
+                           leastOfFour(first + uvec2(0, 2)), leastOfFour(first + 2u));
+  [[dont_unroll]] for (uint i = 0u; i < 4u; ++i)
+      store(1u, 2u * at + uvec2(i % 2u, i / 2u), four[i]);
+  return min(min(four.x, four.y), min(four.z, four.w));
+}
+
+// A texel of level base + 1, of up to 3 x 3 texels of level base.
 uint firstStep(uint base, uvec2 at) {
   const uvec2 begin = 2u * at, end = endOf(at, base + 1u, 1u);
-  if (end == begin + 2u) return leastOfFour(base, begin);
-  uint farthest = load(base, begin);
+  uint farthest = kBeyondDepth;
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x) farthest = min(farthest, load(base, uvec2(x, y)));
   return farthest;
 }
 
+// A texel of level base + 2, and those of level base + 1 that it is made of.
+uint secondStep(uint base, uvec2 at) {
+  if (base == 0u && endOf(at, 2u, 2u) == 4u * at + 4u) return firstTwoSteps(at);
+  const uvec2 begin = 2u * at, end = endOf(at, base + 2u, 1u);
+  uint farthest = kBeyondDepth;
+  for (uint y = begin.y; y < end.y; ++y)
+    for (uint x = begin.x; x < end.x; ++x) {
+      const uint texel = firstStep(base, uvec2(x, y));
+      store(base + 1u, uvec2(x, y), texel);
+      farthest = min(farthest, texel);
+    }
+  return farthest;
+}
+
 // Texels of later levels stand as far apart as the first ones that they are made of: only the
 // thread that makes a texel reads what stands in its place.
-uint sharedPlace(uvec2 local, uint step) { return (local.y * kPitch + local.x) << (step - 1u); }
+uint sharedPlace(uvec2 local, uint step) { return (local.y * kPitch + local.x) << (step - 2u); }
 
-uint laterStep(uvec2 begin, uvec2 end, uint step) {
-  uint farthest = tileTexels[sharedPlace(begin, step - 1u)];
-  for (uint y = begin.y; y < end.y; ++y)
-    for (uint x = begin.x; x < end.x; ++x)
-      farthest = min(farthest, tileTexels[sharedPlace(uvec2(x, y), step - 1u)]);
+// Of 3 x 3 texels at most: where there are fewer, some count twice.
+uint laterStep(uvec2 begin, uvec2 last, uint step) {
+  uint farthest = kBeyondDepth;
+  [[dont_unroll]] for (uint i = 0u; i < 9u; ++i) {
+    const uvec2 at = min(begin + uvec2(i % 3u, i / 3u), last);
+    farthest = min(farthest, tileTexels[sharedPlace(at, step - 1u)]);
+  }
   return farthest;
 }
 
 // Levels base + 1 to base + kHizTile of one tile, the last of them into scratch, where another
 // round may go on from it. Neighbouring threads have neighbouring texels.
 void reduce(uint base, uvec2 tile) {
-  const uvec2 lane =
-      uvec2(gl_LocalInvocationIndex % kThreads.x, gl_LocalInvocationIndex / kThreads.x);
-  [[dont_unroll]] for (uint step = 1u; step <= kHizTile; ++step) {
+  const uvec2 lane = uvec2(gl_LocalInvocationIndex % kSide, gl_LocalInvocationIndex / kSide);
+  [[dont_unroll]] for (uint step = 2u; step <= kHizTile; ++step) {
     barrier();
     const uint up = kHizTile - step;
     const uvec2 begin = tile << up, size = endOf(tile, base + kHizTile, up) - begin;
-    for (uint y = lane.y; y < size.y; y += kThreads.y)
-      for (uint x = lane.x; x < size.x; x += kThreads.x) {
+    for (uint y = lane.y; y < size.y; y += kSide)
+      for (uint x = lane.x; x < size.x; x += kSide) {
         const uvec2 local = uvec2(x, y), at = begin + local;
-        const uvec2 end = endOf(at, base + step, 1u) - 2u * begin;
-        const uint texel = step == 1u ? firstStep(base, at) : laterStep(2u * local, end, step);
+        const uvec2 last = endOf(at, base + step, 1u) - 2u * begin - 1u;
+        const uint texel = step == 2u ? secondStep(base, at) : laterStep(2u * local, last, step);
         store(base + step, at, texel);
         tileTexels[sharedPlace(local, step)] = texel;
         if (step == kHizTile) scratch[placeOf(base + kHizTile, at)] = texel;
@@ -118,14 +136,12 @@ void reduce(uint base, uvec2 tile) {
   }
 }
 
-// Whether all other groups have written their texels of level kHizTile.
+// Whether all other groups have written their texels of level kHizTile. The thread that counts a
+// group has written its texel: nothing else has to be in order.
 bool isLastGroup() {
-  controlBarrier(gl_ScopeWorkgroup, gl_ScopeDevice, gl_StorageSemanticsBuffer,
-                 gl_SemanticsAcquireRelease);
   if (isFirstThread())
-    lastGroup =
-        atomicAdd(scratch[0], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer,
-                  gl_SemanticsAcquireRelease) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
+    lastGroup = atomicAdd(scratch[0], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer,
+                          gl_SemanticsRelease) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u;
   barrier();
   return lastGroup;
 }
@@ -137,7 +153,7 @@ void main() {
     for (uint y = first.y; y < end.y; ++y)
       for (uint x = first.x; x < end.x; ++x) reduce(base, uvec2(x, y));
     if (base == 0u && !isLastGroup()) return;
-    memoryBarrierBuffer();  // the next round reads what this one has written, behind its barrier
+    memoryBarrierBuffer();  // the next round reads what this one and other groups have written
     first = uvec2(0);
     end = sizeOf(base + 2u * kHizTile);
   }

@@ -42,7 +42,6 @@ const bool whole = registerKernel({
       return {tilesOf(depth.width), tilesOf(depth.height), 1};
     },
     .features = {"scalarBlockLayout", "shaderStorageImageWriteWithoutFormat"},
-    .mutates = false,  // TODO: its score is not on record yet
     .conventions = {{"lookup", {"pinned", "next_pow2", "previous_pow2", "fold3"}}},
     .summary = "the pyramid of farthest depths, all levels in one dispatch",
 });

@@ -1,7 +1,7 @@
 // Occlusion culling: the spheres of what the frustum has left against the pyramid of depths.
 #include "culling.h"
-#include "../lib/safe.glsl"
 #include "bounds.glsl"
+#include "hiz.glsl"
 
 layout(local_size_x = kGroupSize) in;
 layout(push_constant, scalar) uniform Push { Occlusion push; };
@@ -52,8 +52,7 @@ uvec2 pixels(vec2 clip, uint size) {
 
 float texel(uvec2 at, uint level) {
   if (level > 0) return texelFetch(pyramid, ivec2(at), int(level) - 1).r;
-  const float d = texelFetch(depth, ivec2(at), 0).r;
-  return isFinite(d) && d > 0.0 ? d : 0.0;
+  return uintBitsToFloat(depthBits(texelFetch(depth, ivec2(at), 0).r));
 }
 
 // findMSB of 0 is -1, so that a single pixel is on level 0. Where a level has no texel for a side

@@ -29,7 +29,7 @@ Footprint footprint(const uvec2& size, uint level, const uvec2& texel) {
   return {footprint(size.x, level, texel.x), footprint(size.y, level, texel.y)};
 }
 
-float counted(float depth) { return std::isfinite(depth) && depth > 0 ? depth : 0.0f; }
+float counted(float depth) { return std::isnormal(depth) && depth > 0 ? depth : 0.0f; }
 
 template <class T>
 T farthest(const DepthBuffer& buffer, const Footprint& covered) {

@@ -40,7 +40,7 @@ struct DepthBuffer {
   float at(uint x, uint y) const { return depths[std::size_t{y} * size.x + x]; }
 };
 
-/// A depth as it counts: NaN, infinite or negative is 0, the farthest, and -0 is 0.
+/// A depth as it counts: NaN, infinite, negative or denormal is 0, the farthest, and -0 is 0.
 float counted(float depth);
 
 /// The smallest depth of a footprint that is not empty.

@@ -5,6 +5,7 @@
 // Not covered: that the formulas of those conventions are what anybody ships.
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "harness/cases/modelled.h"
@@ -74,7 +75,7 @@ TEST(CullingHizModel, EveryTexelLiesInOneOfTheNextLevel) {
 
 TEST(CullingHizModel, BadDepthsCountAsTheFarthest) {
   for (const float depth : specialFloats({1e-40f})) {
-    const bool good = std::isfinite(depth) && depth > 0;
+    const bool good = depth >= std::numeric_limits<float>::min() && depth < INFINITY;
     EXPECT_EQ(farthest({{1, 1}, {depth}}, whole({1, 1})), good ? depth : 0.0f);
     EXPECT_FALSE(std::signbit(farthest({{1, 1}, {depth}}, whole({1, 1}))));
     EXPECT_EQ(farthest({{2, 1}, {1, depth}}, whole({2, 1})), good ? std::min(depth, 1.0f) : 0.0f);

@@ -1,4 +1,4 @@
-#include "harness/cases/cache.h"
+#include "harness/cache.h"
 
 #include <cstdlib>
 
