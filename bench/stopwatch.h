@@ -27,9 +27,10 @@ class Stopwatch {
   /// Programmer error if there is none.
   static Stopwatch& current();
 
-  /// Keeps the device busy for a while: one that has waited for the host runs at a low clock, and
-  /// took three times as long for the same work.
-  void wake() const;
+  /// Keeps the device busy until an empty dispatch takes no longer than it ever has: one that has
+  /// waited for the host runs at a low clock, took three times as long for the same work, and after
+  /// seconds of waiting needed two to wake. Gives up after five.
+  void wake();
 
   /// Seconds on the device that one run takes with cold caches: another dispatch, in the same
   /// submission, has read and written more than they hold just before.

@@ -155,7 +155,7 @@ int bench(const BenchOptions& given) {
   Terminal terminal(options.json == "-" ? stderr : stdout);
   const std::string device =
       fmt::format("{}, {}", session.gpu().info().name, session.gpu().info().driver);
-  const Stopwatch watch(session);
+  Stopwatch watch(session);
   terminal.print(device + "\n" + contextOf(watch));
   if (runsObjects(options.stages))
     registerObjects(options.most.value_or(kMostObjects), options.session.seed);

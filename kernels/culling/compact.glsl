@@ -14,10 +14,10 @@
 
 const uint kWords = kBlock / 32;
 const uint kPerThread = kBlock / kGroupSize;
+shared uint visible[kWords];  // a bit a candidate
 shared uint blockOfGroup;
-shared uint visible[kWords];          // a bit a candidate
-shared uint visibleBefore;            // the block
 shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
+shared uint visibleBefore;            // the block
 shared bool isLastGroup;
 
 bool isVisible(uint candidate);
@@ -42,11 +42,8 @@ uint countOf(uint block, inout uint patience) {
 }
 
 void takeBlock(uint lane) {
-  if (isFirstThread()) {
-    blockOfGroup = atomicAdd(scratch[kTicket], 1u);
-    visibleBefore = 0;
-  }
   if (lane < kWords) visible[lane] = 0;
+  if (isFirstThread()) blockOfGroup = atomicAdd(scratch[kTicket], 1u);
   barrier();
 }
 
@@ -65,8 +62,10 @@ void publish(uint lane) {
     uint before = 0;
     for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
     visibleUpTo[lane] = before;
-    if (lane == kWords)
+    if (lane == kWords) {
+      visibleBefore = 0;
       atomicStore(scratch[kBlocks + blockOfGroup], before + 1, gl_ScopeDevice, 0, 0);
+    }
   }
   barrier();
 }
@@ -80,7 +79,9 @@ void askOthers(uint lane, uint patience) {
 #else
   atomicAdd(visibleBefore, before);
 #endif
-  barrier();
+  // What the group has used of the scratch is used before the thread that counts the group goes on.
+  controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup,
+                 gl_StorageSemanticsBuffer | gl_StorageSemanticsShared, gl_SemanticsAcquireRelease);
 }
 
 void listBlock(uint lane, uint capacity) {
@@ -114,8 +115,6 @@ uint visibleSoFar(uint lane, uint candidates, uint capacity, uint patience) {
 /// The last group of all sums up and leaves the scratch as it was: zero. What is visible up to a
 /// block only grows with it, so the largest number said is all.
 void finish(uint lane, uint soFar, uint candidates, uint capacity) {
-  controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer,
-                 gl_SemanticsAcquireRelease);
   if (isFirstThread()) {
     atomicMax(scratch[kTotal], soFar);
     isLastGroup = atomicAdd(scratch[kFinished], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer,

@@ -56,47 +56,38 @@ uint placeOf(uint level, uvec2 at) {
   return 1u + first.y * sizeOf(kHizTile).x + first.x;
 }
 
-uint load(uint level, uvec2 at) {
-  if (level == 0u) return depthBits(texelFetch(depth, ivec2(at), 0).r);
-  return scratch[placeOf(level, at)];
-}
-
-// Of the 2 x 2 pixels from `first` on: those around their corner.
-uint leastOfFour(uvec2 first) {
-  const vec2 corner = vec2(first + 1u) / vec2(textureSize(depth, 0));
-  const vec4 four = textureGather(sampler2D(depth, nearest), corner);
+// Of the 2 x 2 pixels around a corner.
+uint leastAround(uvec2 corner) {
+  const vec4 four =
+      textureGather(sampler2D(depth, nearest), vec2(corner) / vec2(textureSize(depth, 0)));
   return min(min(depthBits(four.x), depthBits(four.y)), min(depthBits(four.z), depthBits(four.w)));
 }
 
-// A texel of level 2 that is made of 4 x 4 pixels, and its four of level 1. All pixels are asked
-// for before the first is used: what this kernel takes is waiting for them.
-uint firstTwoSteps(uvec2 at) {
-  const uvec2 first = 4u * at;
-  const uvec4 four = uvec4(leastOfFour(first), leastOfFour(first + uvec2(2, 0)),
-                           leastOfFour(first + uvec2(0, 2)), leastOfFour(first + 2u));
-  [[dont_unroll]] for (uint i = 0u; i < 4u; ++i)
-      store(1u, 2u * at + uvec2(i % 2u, i / 2u), four[i]);
-  return min(min(four.x, four.y), min(four.z, four.w));
-}
-
-// A texel of level base + 1, of up to 3 x 3 texels of level base.
-uint firstStep(uint base, uvec2 at) {
-  const uvec2 begin = 2u * at, end = endOf(at, base + 1u, 1u);
+// A texel of level base + 1, of the texels [begin, end) of level base, up to 3 x 3. Pixels come
+// four at a time, where there are three a side some of them twice.
+uint firstStep(uint base, uvec2 begin, uvec2 end) {
   uint farthest = kBeyondDepth;
-  for (uint y = begin.y; y < end.y; ++y)
-    for (uint x = begin.x; x < end.x; ++x) farthest = min(farthest, load(base, uvec2(x, y)));
+  if (base == 0u) {
+    const uvec2 first = begin + 1u, last = max(end - 1u, first);
+    for (uint y = first.y; y <= last.y; ++y)
+      for (uint x = first.x; x <= last.x; ++x) farthest = min(farthest, leastAround(uvec2(x, y)));
+  } else {
+    for (uint y = begin.y; y < end.y; ++y)
+      for (uint x = begin.x; x < end.x; ++x)
+        farthest = min(farthest, scratch[placeOf(base, uvec2(x, y))]);
+  }
   return farthest;
 }
 
 // A texel of level base + 2, and those of level base + 1 that it is made of.
 uint secondStep(uint base, uvec2 at) {
-  if (base == 0u && endOf(at, 2u, 2u) == 4u * at + 4u) return firstTwoSteps(at);
   const uvec2 begin = 2u * at, end = endOf(at, base + 2u, 1u);
   uint farthest = kBeyondDepth;
   for (uint y = begin.y; y < end.y; ++y)
     for (uint x = begin.x; x < end.x; ++x) {
-      const uint texel = firstStep(base, uvec2(x, y));
-      store(base + 1u, uvec2(x, y), texel);
+      const uvec2 child = uvec2(x, y);
+      const uint texel = firstStep(base, 2u * child, endOf(child, base + 1u, 1u));
+      store(base + 1u, child, texel);
       farthest = min(farthest, texel);
     }
   return farthest;
@@ -108,7 +99,7 @@ uint sharedPlace(uvec2 local, uint step) { return (local.y * kPitch + local.x) <
 
 // Of 3 x 3 texels at most: where there are fewer, some count twice.
 uint laterStep(uvec2 begin, uvec2 last, uint step) {
-  uint farthest = kBeyondDepth;
+  uint farthest = tileTexels[sharedPlace(begin, step - 1u)];
   [[dont_unroll]] for (uint i = 0u; i < 9u; ++i) {
     const uvec2 at = min(begin + uvec2(i % 3u, i / 3u), last);
     farthest = min(farthest, tileTexels[sharedPlace(at, step - 1u)]);
@@ -148,14 +139,15 @@ bool isLastGroup() {
 
 void main() {
   // Tiles of a round. Those that take a rest have most to do, so their groups start first.
-  uvec2 first = gl_NumWorkGroups.xy - 1u - gl_WorkGroupID.xy, end = first + 1u;
+  uvec2 tiles = gl_NumWorkGroups.xy;
+  uint first = tiles.x * (tiles.y - gl_WorkGroupID.y) - gl_WorkGroupID.x - 1u, end = first + 1u;
   for (uint base = 0u; base < lastLevel(); base += kHizTile) {
-    for (uint y = first.y; y < end.y; ++y)
-      for (uint x = first.x; x < end.x; ++x) reduce(base, uvec2(x, y));
+    for (uint t = first; t < end; ++t) reduce(base, uvec2(t % tiles.x, t / tiles.x));
     if (base == 0u && !isLastGroup()) return;
     memoryBarrierBuffer();  // the next round reads what this one and other groups have written
-    first = uvec2(0);
-    end = sizeOf(base + 2u * kHizTile);
+    tiles = sizeOf(base + 2u * kHizTile);
+    first = 0u;
+    end = tiles.x * tiles.y;
   }
   const uvec2 groups = sizeOf(kHizTile);
   for (uint i = gl_LocalInvocationIndex; i <= groups.x * groups.y; i += kHizGroup) scratch[i] = 0u;
