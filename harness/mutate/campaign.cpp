@@ -137,9 +137,7 @@ class Campaign {
   }
 
   WorkerOptions optionsFor(Chunk& chunk) {
-    std::map<std::string, std::string> environment = chunk.environment;
-    environment["MESA_SHADER_CACHE_DISABLE"] = "true";  // nobody runs a mutant again
-    return {.environment = std::move(environment),
+    return {.environment = chunk.environment,
             .limit = caseLimit(schedule.session, schedule.policy),
             .limitOf = [this](const std::string& name) { return patience(name); },
             .memoryBytes = memoryLimit(schedule.policy, "foreignGibibytes"),

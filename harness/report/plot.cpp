@@ -15,7 +15,7 @@ namespace {
 
 // Pixels.
 constexpr double kPanelWidth = 400, kPanelHeight = 340;
-constexpr double kLeft = 64, kTop = 76, kGap = 28, kBelow = 52, kMargin = 16;
+constexpr double kLeft = 72, kLabel = 12, kTop = 76, kGap = 28, kBelow = 52, kMargin = 16;
 constexpr double kLegendRow = 20, kLegendColumn = 200, kSwatch = 30;
 constexpr double kMarker = 3.2;
 
@@ -78,8 +78,8 @@ class Drawing {
       left += kPanelWidth + kGap;
     }
     const double middle = kTop + kPanelHeight / 2;
-    write(16, middle, plot.yLabel,
-          fmt::format("text-anchor=\"middle\" transform=\"rotate(-90 16 {})\"", middle));
+    write(kLabel, middle, plot.yLabel,
+          fmt::format("text-anchor=\"middle\" transform=\"rotate(-90 {} {})\"", kLabel, middle));
     for (std::size_t i = 0; i < names.size(); ++i)
       drawKey(names[i], kLeft + kLegendColumn * static_cast<double>(i % columns),
               legendTop + kLegendRow * static_cast<double>(i / columns));

@@ -117,26 +117,42 @@ Sight<double> projected(const Scene& scene, const Bounds& sphere) {
   return {0, left, right, top, bottom, at({0, 0, c.z + r}).z};
 }
 
+/// The same things through a projection whose picture is upside down, mirrored and off the middle.
+Scene turned(Scene scene) {
+  const dmat4 onScreen =
+      glm::translate(dmat4(1), dvec3(0.25, -0.5, 0)) * glm::scale(dmat4(1), dvec3(-1, -1, 1));
+  scene.projection = onScreen * scene.projection;
+  scene.camera = cameraOf(scene.view, scene.projection, scene.near);
+  return scene;
+}
+
+/// Judges the spheres around a scene, and gives how many of them lie behind the near plane.
+std::size_t expectEdgesAndDepth(const Scene& scene) {
+  std::size_t judged = 0;
+  const Pyramid pyramid = pyramidOf(scene.depth);
+  for (const Bounds& sphere : spheresAround(scene, 40, caseSeed())) {
+    const Sight<double> found = sight(scene, sphere, pyramid);
+    if (found.depth == 0) continue;
+    const Sight<double> expected = projected(scene, sphere);
+    ++judged;
+    // A search knows a slope to 1e-12, and centres a million units away cancel to 1e-9.
+    constexpr double kClose = 1e-6;
+    EXPECT_NEAR(found.left, expected.left, kClose) << nameOf(scene.kind);
+    EXPECT_NEAR(found.right, expected.right, kClose) << nameOf(scene.kind);
+    EXPECT_NEAR(found.top, expected.top, kClose) << nameOf(scene.kind);
+    EXPECT_NEAR(found.bottom, expected.bottom, kClose) << nameOf(scene.kind);
+    EXPECT_NEAR(found.depth, expected.depth, kClose) << nameOf(scene.kind);
+  }
+  return judged;
+}
+
 // Under every projection, on the screen, on its edges and beyond them.
 TEST(CullingOcclusionModel, EdgesAndDepthAreThoseOfProjectedPoints) {
   std::size_t judged = 0;
   forEachScene(4, [&](const Scene& scene) {
-    const Pyramid pyramid = pyramidOf(scene.depth);
-    for (const Bounds& sphere : spheresAround(scene, 40, caseSeed())) {
-      const Sight<double> found = sight(scene, sphere, pyramid);
-      if (found.depth == 0) continue;  // it is before the near plane
-      const Sight<double> expected = projected(scene, sphere);
-      ++judged;
-      // A search knows a slope to 1e-12, and centres a million units away cancel to 1e-9.
-      constexpr double kClose = 1e-6;
-      EXPECT_NEAR(found.left, expected.left, kClose) << nameOf(scene.kind);
-      EXPECT_NEAR(found.right, expected.right, kClose) << nameOf(scene.kind);
-      EXPECT_NEAR(found.top, expected.top, kClose) << nameOf(scene.kind);
-      EXPECT_NEAR(found.bottom, expected.bottom, kClose) << nameOf(scene.kind);
-      EXPECT_NEAR(found.depth, expected.depth, kClose) << nameOf(scene.kind);
-    }
+    judged += expectEdgesAndDepth(scene) + expectEdgesAndDepth(turned(scene));
   });
-  EXPECT_GT(judged, std::size_t{12} * 4 * 40 / 2);
+  EXPECT_GT(judged, std::size_t{2} * kSceneKinds * 4 * 40 / 2);
 }
 
 // How much of the true width the naive 2 r / d covers; numbers computed elsewhere, to the digits
@@ -294,6 +310,12 @@ TEST(CullingOcclusionModel, WhatReachesBeforeTheNearPlaneIsVisible) {
   EXPECT_TRUE(visible(scene, {{2.0f * kSteepest, 0, -1.0f}, 0.25f}));
 }
 
+// On exact numbers. Behind a depth that no scene has, beyond the near plane's own of 1.
+TEST(CullingOcclusionModel, WhatTouchesTheNearPlaneDoesNotReachBeforeIt) {
+  for (const dmat4& projection : {perspective(1.2, 1.5, 0.5), orthographic(-9, 5, -3, 4, 0.5, 16)})
+    EXPECT_FALSE(visible(before(projection, {64, 48}, 1.5f), {{0, 0, -1.5f}, 1}));
+}
+
 // What the algorithm finds of what is hidden depends on the scenes: of these, which are the same
 // for every --seed and --cases, it is on record, so that a change of the rules shows.
 TEST(CullingOcclusionModel, TheShareOfHiddenThingsFoundIsAsRecorded) {
@@ -343,6 +365,8 @@ TEST(CullingOcclusionModel, FarToTheSideIsVisibleInPerspectiveAlone) {
       };
       EXPECT_FALSE(visible(scene, at(kSteepest), pyramid));
       EXPECT_TRUE(visible(scene, at(kSteepest + 1), pyramid));
+      const Bounds farther{4.0f * at(kSteepest).centre, 0.25f};
+      EXPECT_FALSE(visible(scene, farther, pyramid));
       const Scene flat = before(orthographic(-9, 5, -3, 4, 0.5, 16), {61, 33}, 1);
       EXPECT_FALSE(visible(flat, at(kSteepest + 1)));
     }

@@ -262,6 +262,13 @@ TEST_F(CullingOcclusion, ADepthThatIsTheSpheresOwnDoesNotHideIt) {
   expectRightList(occlusionInput(flat(), all, filled({64, 64}, 0.5f)));
 }
 
+// On exact numbers, behind a depth that no scene has: beyond the near plane's own of 1.
+TEST_F(CullingOcclusion, WhatTouchesTheNearPlaneDoesNotReachBeforeIt) {
+  widthDoesNotMatter();
+  expectRightList(occlusionInput(flat(), {{{20, 20, -1.25f}, 0.25f}, {{20, 20, -1.24f}, 0.25f}},
+                                 filled({64, 64}, 1.5f)));
+}
+
 // Depths of 2^-16, before what is at 5e-5 and behind it, and in pixels whose depth is bad.
 TEST_F(CullingOcclusion, TheSmallestDepthsHideToo) {
   widthDoesNotMatter();
