@@ -5,6 +5,8 @@
 #include <cmath>
 #include <deque>
 #include <exception>
+#include <functional>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -45,13 +47,16 @@ class Campaign {
   }
 
   void run(const GpuInfo& gpu) {
-    std::vector<CaseName> cases;
-    for (const Witness& w : witnesses) cases.push_back(w.name);
-    std::vector<std::size_t> all(mutants.size());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+    // Some go first and show which cases kill most: the others meet those first.
+    constexpr std::size_t kOneOf = 16;
+    std::vector<std::size_t> first, others;
+    for (std::size_t i = 0; i < mutants.size(); ++i)
+      (i % kOneOf == 0 ? first : others).push_back(i);
     const std::vector<unsigned> widths = widthsFor(gpu);
     last = widths.empty();
-    runAll(all, cases, {}, {});
+    runAll(first, allCases(), {}, {});
+    putKillersFirst();
+    runAll(others, allCases(), {}, {});
     for (const unsigned width : widths) {
       last = width == widths.back();
       runAll(survivors(), casesAt(width), environmentFor(width),
@@ -60,6 +65,21 @@ class Campaign {
   }
 
  private:
+  std::vector<CaseName> allCases() const {
+    std::vector<CaseName> cases;
+    for (const Witness& w : witnesses) cases.push_back(w.name);
+    return cases;
+  }
+
+  /// Those that have killed as many stay as they are, the cheapest first.
+  void putKillersFirst() {
+    std::map<std::string, std::size_t> kills;
+    for (const Fate& f : fates)
+      if (!f.kills.empty()) ++kills[f.kills.front().by];
+    std::ranges::stable_sort(witnesses, std::greater{},
+                             [&](const Witness& w) { return kills[w.name.name]; });
+  }
+
   std::vector<CaseName> casesAt(unsigned width) const {
     std::vector<CaseName> cases;
     for (const Witness& w : witnesses)
@@ -203,7 +223,7 @@ class Campaign {
   const Schedule& schedule;
   const std::string& kernel;
   const std::vector<Mutant>& mutants;
-  const std::vector<Witness>& witnesses;
+  std::vector<Witness> witnesses;
   const unsigned sought;
   const CampaignObserver& observer;
   std::vector<Fate> fates;

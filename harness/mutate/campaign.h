@@ -35,9 +35,10 @@ struct CampaignObserver {
   std::function<void(const Mutant&, const Fate&)> told{};  ///< once for each, in any order
 };
 
-/// Runs the witnesses on each mutant in workers, cheapest first, until `sought` of them have failed
-/// or none is left; what survives in kernels whose threads communicate, also in subgroups of other
-/// sizes. A mutant that crashes, hangs or exhausts its worker is killed by the case that ran.
+/// Runs the witnesses on each mutant in workers until `sought` of them have failed or none is left,
+/// the cheapest first, until a sixteenth of the mutants has shown which of them kill most; what
+/// survives in kernels whose threads communicate, also in subgroups of other sizes. A mutant that
+/// crashes, hangs or exhausts its worker is killed by the case that ran.
 void judgeMutants(const Schedule& schedule, const GpuInfo& gpu, const std::string& kernel,
                   const std::vector<Mutant>& mutants, const std::vector<Witness>& witnesses,
                   unsigned sought, const CampaignObserver& observer);

@@ -102,9 +102,10 @@ KernelRecord occlusion(std::string entry) {
   return record;
 }
 
-/// The other path to the same contract. Of its own it has how counts are summed, in both alike.
+/// The other path to the same contract. Of its own it has how counts are summed, in both alike, and
+/// where that puts a draw.
 KernelRecord withSubgroups(KernelRecord record) {
-  record.ownCode = {"culling/compact.glsl:askOthers"};
+  record.ownCode = {"culling/compact.glsl:askOthers", "culling/compact.glsl:listBlock"};
   record.features.emplace_back("subgroupArithmetic");
   record.summary = "the same with subgroup operations";
   return record;
