@@ -336,7 +336,7 @@ void ListCase::expectAnswers(OcclusionInput input) {
 }
 
 void ListCase::expectAnswersTo(const Stimulus& stimulus) {
-  constexpr int kRuns = 50;
+  constexpr int kRuns = 200;
   uint least = ~0u;
   for (int i = 0; i < kRuns && least > 0; ++i) {
     const auto outputs = runTwinOnce(Session::current().subject(kernelName), stimulus);
@@ -413,7 +413,7 @@ std::vector<Bounds> spheresAround(const Scene& scene, std::size_t n, std::uint64
         scene.perspective()
             ? glm::dvec3((u + p[2][0]) / p[0][0] * d, (v + p[2][1]) / p[1][1] * d, -d)
             : glm::dvec3((u - p[3][0]) / p[0][0], (v - p[3][1]) / p[1][1], -d);
-    const double most = scene.perspective() ? d : 1 / p[0][0];
+    const double most = scene.perspective() ? d : 1 / std::abs(p[0][0]);
     spheres.push_back(
         {vec3(world * glm::dvec4(at, 1)), static_cast<float>(most * random.logUniform(1e-4, 1))});
   }

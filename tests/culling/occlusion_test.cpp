@@ -89,14 +89,11 @@ class OcclusionCase : public ListCase {
   }
 
   /// A thread then asks more than one group. Every third object is before a wall at distance 8.
-  void moreBlocksThanThreadsAreListed() {
-    widthDoesNotMatter();
+  static OcclusionInput moreBlocksThanThreads() {
     std::vector<Bounds> all;
     for (std::size_t i = 0; i < kMoreThanThreads; ++i)
       all.push_back({{0, 0, i % 3 == 0 ? -4.0f : -50.0f}, 1});
-    const OcclusionInput input = occlusionInput(eye(), all, filled({61, 43}, 1 / 16.0f));
-    expectEveryThird(visible(input));
-    expectAnswers(input);
+    return occlusionInput(eye(), all, filled({61, 43}, 1 / 16.0f));
   }
 
   void blocksAreCountedByWhoeverAsksNobody() {
@@ -140,9 +137,16 @@ TEST_F(CullingOcclusionSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
 }
 
-TEST_F(CullingOcclusion, MoreBlocksThanThreadsAreListed) { moreBlocksThanThreadsAreListed(); }
+// Whether they are answered, the frustum's case tells: it asks with the same code.
+TEST_F(CullingOcclusion, MoreBlocksThanThreadsAreListed) {
+  widthDoesNotMatter();
+  expectEveryThird(visible(moreBlocksThanThreads()));
+}
 TEST_F(CullingOcclusionSubgroups, MoreBlocksThanThreadsAreListed) {
-  moreBlocksThanThreadsAreListed();
+  widthDoesNotMatter();
+  const OcclusionInput input = moreBlocksThanThreads();
+  expectEveryThird(visible(input));
+  expectAnswers(input);
 }
 
 TEST_F(CullingOcclusion, GroupsThatAskAreAnswered) {
@@ -323,6 +327,19 @@ TEST_F(CullingOcclusion, EveryPixelIsFoundByTheSphereInIt) {
       const float r = 0.5f - 0x1p-11f;
       all.push_back({{static_cast<float>(x) + r, static_cast<float>(y) + r, -50}, r});
     }
+  expectRightList(occlusionInput(flat(), all, depth));
+}
+
+// By 2^-10 of a pixel, where the one before is sky and its own is wall.
+TEST_F(CullingOcclusion, AnEdgeJustBeforeAPixelIsInTheOneBefore) {
+  widthDoesNotMatter();
+  Picture depth = filled({64, 64}, 0.5f);
+  std::vector<Bounds> all;
+  const float r = 0.5f - 0x1p-11f;
+  for (uint i = 0; i < 64 * 64; ++i)
+    if (i % 8 >= 6) depth.texels[i].x = 0;
+  for (uint x = 0; x < 64; x += 8)
+    all.push_back({{static_cast<float>(x) + r - 0x1p-10f, 20 + r, -50}, r});
   expectRightList(occlusionInput(flat(), all, depth));
 }
 
