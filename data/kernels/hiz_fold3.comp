@@ -14,7 +14,7 @@ void main() {
   for (int y = 0; y < taps.y; ++y)
     for (int x = 0; x < taps.x; ++x) {
       const float depth = texelFetch(parent, min(2 * at + ivec2(x, y), size - 1), 0).r;
-      farthest = min(farthest, depth > 0.0 && depth <= 3.402823466e38 ? depth : 0.0);
+      farthest = min(farthest, depth >= 1.175494351e-38 && depth <= 3.402823466e38 ? depth : 0.0);
     }
   imageStore(level, at, vec4(farthest));
 }

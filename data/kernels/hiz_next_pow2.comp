@@ -9,7 +9,7 @@ layout(push_constant) uniform Push { uvec2 size; };  // of the parent
 
 float depthAt(ivec2 at) {
   const float depth = texelFetch(parent, min(at, ivec2(size) - 1), 0).r;
-  return depth > 0.0 && depth <= 3.402823466e38 ? depth : 0.0;
+  return depth >= 1.175494351e-38 && depth <= 3.402823466e38 ? depth : 0.0;
 }
 
 ivec2 halfOfNextPowerOfTwo() { return ivec2(1) << max(findMSB(ivec2(size) - 1), 0); }

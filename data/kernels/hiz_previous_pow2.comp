@@ -8,7 +8,7 @@ layout(binding = 1, r32f) writeonly uniform image2D level;
 
 float depthAt(uvec2 at, uvec2 size) {
   const float depth = texelFetch(parent, ivec2(min(at, size - 1u)), 0).r;
-  return depth > 0.0 && depth <= 3.402823466e38 ? depth : 0.0;
+  return depth >= 1.175494351e-38 && depth <= 3.402823466e38 ? depth : 0.0;
 }
 
 void main() {
