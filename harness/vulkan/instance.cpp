@@ -68,26 +68,18 @@ std::string processorFeatures() {
 
 // Mesa's software driver keeps machine code on disk by shader and driver, but for any processor and
 // vector width: a driver under test must not answer with what it made for another. So each has a
-// folder. A user's own folder holds, unless a process above has only set it for its own width.
+// folder, also where the user has named one for all.
 void separateShaderCaches() {
-  constexpr const char* kFolder = "MESA_SHADER_CACHE_DIR";
-  const fs::path ours = cacheFolder() / "shaders";
-  if (cacheFolder().empty()) {
-    setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
-    return;
-  }
-  const char* set = std::getenv(kFolder);
-  if (set != nullptr && fs::path(set).parent_path() != ours) return;
   const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
-  const fs::path folder =
-      ours / fmt::format("{:016x}-{}", std::hash<std::string>{}(processorFeatures()),
-                         width == nullptr ? "own" : width);
+  const fs::path folder = cacheFolder() / "shaders" /
+                          fmt::format("{:016x}-{}", std::hash<std::string>{}(processorFeatures()),
+                                      width == nullptr ? "own" : width);
   std::error_code error;
-  fs::create_directories(folder, error);  // Mesa makes one folder, not those above it
-  if (error)
+  if (!cacheFolder().empty()) fs::create_directories(folder, error);  // Mesa makes the last alone
+  if (cacheFolder().empty() || error)
     setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
   else
-    setenv(kFolder, folder.c_str(), /*overwrite=*/1);
+    setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), /*overwrite=*/1);
 }
 
 bool hasValidationLayer() {
