@@ -18,9 +18,7 @@ namespace gnomon {
 void KernelCase::SetUp() {
   skipWhereUnsupported([&] {
     const Subject& subject = Session::current().subject(kernelName);
-    CaseRecord& found = Session::current().currentCase();
-    found.threadsCommunicate = subject.threadsCommunicate();
-    found.usesSubgroups = subject.usesSubgroups();
+    Session::current().currentCase().threadsCommunicate = subject.threadsCommunicate();
   });
 }
 
@@ -34,8 +32,12 @@ void KernelCase::skipWhereUnsupported(const std::function<void()>& attempt) {
 }
 
 void KernelCase::widthDoesNotMatter() {
-  CaseRecord& found = Session::current().currentCase();
-  found.threadsCommunicate = found.usesSubgroups = false;
+  Session::current().currentCase().threadsCommunicate = false;
+}
+
+void KernelCase::threadsDoNotMatter() {
+  widthDoesNotMatter();
+  threadsMatter = false;
 }
 
 void KernelCase::skipUnlessEveryOutputIsGiven() {
@@ -90,7 +92,8 @@ Observation KernelCase::run(Stimulus stimulus) {
   stimulus.limit = session.limit();
   session.currentCase().observed = true;
   const Subject& subject = session.subject(kernelName);
-  Observation seen = observe(subject, stimulus, session.watch());
+  const bool inOrder = !threadsMatter && session.watch() == Watch::kAll;
+  Observation seen = observe(subject, stimulus, inOrder ? Watch::kInOrder : session.watch());
   if (session.options().probes && !subject.record().probes.fields.empty())
     seen.stimulus = std::make_shared<const KeptStimulus>(stimulus);
   return seen;

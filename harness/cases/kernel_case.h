@@ -44,6 +44,10 @@ class KernelCase : public testing::Test {
   /// of the kernel are about.
   void widthDoesNotMatter();
 
+  /// The same, and the order twin of its kernel does not run either: for a case of many images,
+  /// since drivers compile all that runs anew for some sizes and formats.
+  void threadsDoNotMatter();
+
   /// Whether the kernel takes these push constants: a foreign one may stand for one value of some,
   /// as its adapter's constants say. A case goes on to the next where it does not.
   bool applies(std::span<const std::byte> push);
@@ -111,6 +115,7 @@ class KernelCase : public testing::Test {
                     const Expectation& expected, const Explain& explained);
   std::size_t runs = 0, left = 0;  // of run(), and where the kernel did not apply
   std::size_t judgements = 0;      // of generated inputs
+  bool threadsMatter = true;
 };
 
 /// A seed of its own for every case, from the run's seed and the case's name.

@@ -29,7 +29,9 @@ KernelModule moduleOf(const SessionOptions& options, const KernelRecord& record)
 }
 
 Session::Session(SessionOptions options)
-    : settings(std::move(options)), choices(Policy::load(settings.root / "tests/policy.json")) {
+    : settings(std::move(options)),
+      choices(Policy::load(settings.root / "tests/policy.json")),
+      watched(settings.watch) {
   theSession = this;
 }
 

@@ -32,6 +32,8 @@ struct SessionOptions {
   std::filesystem::path replay{};    ///< such a file: its input alone, in place of the case's own
   bool validation = true;            ///< Vulkan's validation layer; off for timing only
   bool probes = true;                ///< a failure names the first intermediate that is wrong
+  Watch watch = Watch::kAll;         ///< how much of every run is watched
+  bool firstFailureOnly = false;     ///< a case ends with its first failure
 };
 
 /// The longest time that a case may take.
@@ -50,8 +52,7 @@ struct CaseRecord {
   std::optional<std::string> waived{};       ///< why its failure is excused
   bool threadsCommunicate = false;           ///< in its kernel, as Subject says
   bool observed = false;                     ///< it ran the kernel as Session::watch() says
-  bool usesSubgroups = false;
-  std::size_t elements = 0;  ///< checked, by a verdict or by a law
+  std::size_t elements = 0;                  ///< checked, by a verdict or by a law
   double seconds = 0;
   std::vector<Verdict> verdicts{};
   DeviceErrors measured{};              ///< of the device, by this case
@@ -81,7 +82,7 @@ class Session {
   /// From now on the kernel is this module, under its own interface: a mutant of it.
   void mutate(const std::string& kernel, SpirvWords module);
 
-  /// How much of every run is watched from now on.
+  /// How much of every run is watched from now on, in place of what the options say.
   void watchOnly(Watch watch) { watched = watch; }
   Watch watch() const { return watched; }
   /// The same kernel with its probes on, compiled at first use; null where it names none. Throws as
@@ -129,7 +130,7 @@ class Session {
   std::optional<DeviceErrors> errors;
   std::map<std::string, std::unique_ptr<Subject>> subjects;
   std::map<std::string, SpirvWords> mutated;
-  Watch watched = Watch::kAll;
+  Watch watched;
   std::map<std::string, std::unique_ptr<ProbedKernel>> probedKernels;
   std::vector<CaseRecord> records;
 };

@@ -50,6 +50,7 @@ struct ValidateOptions {
   std::filesystem::path out;  ///< folder for what each case found
   std::filesystem::path junit;
   bool require = false;            ///< unsupported and skipped cases are failures
+  bool failFast = false;           ///< stop at the first failure
   std::optional<unsigned> jobs{};  ///< workers at a time
 };
 int validate(const ValidateOptions& options);

@@ -154,6 +154,7 @@ void addValidate(CLI::App& app, Action& action) {
   addShard(*command, o->selection);
   command->add_option("--jobs", o->jobs, kJobs)->check(CLI::PositiveNumber)->type_name("N");
   command->add_flag("--require", o->require, "Unsupported or skipped cases are failures");
+  command->add_flag("--fail-fast", o->failFast, "Stop at the first failure; the rest does not run");
   addSessionOptions(*command, o->session, o->json);
   command->footer(kExit);
   command->callback([&action, o] { action = [o] { return validate(*o); }; });

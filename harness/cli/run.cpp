@@ -3,12 +3,19 @@
 #include <algorithm>
 #include <iterator>
 
+#include <fmt/format.h>
+
 #include "harness/isolate/sweep.h"
 
 namespace gnomon {
 namespace {
 
 bool measuresTheDevice(const CaseName& c) { return c.kernel.starts_with("precision/"); }
+
+std::string nameOf(const Turn& turn) {
+  if (turn.width == 0) return turn.name.name;
+  return fmt::format("{} in subgroups of {}", turn.name.name, lanesOf(turn.width));
+}
 
 }  // namespace
 
@@ -22,45 +29,41 @@ Run::Run(RunOptions o, std::vector<CaseName> c)
 }
 
 void Run::judge() {
-  std::vector<CaseName> measuring, others;
-  for (const CaseName& c : cases) (measuresTheDevice(c) ? measuring : others).push_back(c);
-  runAt(0, measuring);
+  std::vector<Turn> turns, measuring, others;
+  for (const CaseName& c : cases) {
+    turns.push_back({c});
+    (measuresTheDevice(c) ? measuring : others).push_back({c});
+  }
+  runAll(measuring, turns);
+  if (hadEnough()) return tellTheRest();
   learnErrors(measuring);
-  runAt(0, others);
-  for (const unsigned width : otherWidths(options.prepared.gpu)) sweep(width);
+  runAll(others, turns);
+  if (hadEnough()) return tellTheRest();
+  sweep();
 }
 
-void Run::runAt(unsigned width, const std::vector<CaseName>& wanted) {
-  const auto done = [&](const CaseName& c) { return found.contains({width, c.name}); };
-  const std::vector<CaseName>& counted = width == 0 ? cases : wanted;
-  std::vector<CaseName> left;
+void Run::runAll(const std::vector<Turn>& wanted, const std::vector<Turn>& counted) {
+  const auto done = [&](const Turn& t) { return found.contains({t.width, t.name.name}); };
+  std::vector<Turn> left;
   std::ranges::remove_copy_if(wanted, std::back_inserter(left), done);
-  std::vector<Batch> batches =
-      batchesOf(left, options.session, static_cast<std::size_t>(options.policy["batchCases"]));
-  if (width != 0)
-    for (Batch& b : batches) b.environment = environmentFor(width);
-
+  auto ended = static_cast<std::size_t>(std::ranges::count_if(counted, done));
   std::vector<std::string> running;
-  const auto tell = [&] {
-    options.observer.progress(static_cast<std::size_t>(std::ranges::count_if(counted, done)),
-                              counted.size(), lanesOf(width), running);
-  };
-  const auto begin = [&](const CaseName& c) {
-    running.push_back(c.name);
+  const auto tell = [&] { options.observer.progress(ended, counted.size(), running); };
+  const auto begin = [&](const Turn& turn) {
+    running.push_back(nameOf(turn));
     tell();
   };
-  const auto end = [&](CaseRecord record) {
+  const auto end = [&](unsigned width, CaseRecord record) {
     if (options.results) options.results->append({width, record});
-    std::erase(running, record.name);
+    std::erase(running, nameOf({{record.name, record.kernel}, width}));
     found[{width, record.name}] = std::move(record);
+    ++ended;
     tell();
     if (width == 0) tellInOrder();
   };
-  SessionOptions session = options.session;
-  if (width != 0) session.shrinks = false;  // at that width a replay would need its environment
-  runBatches({session, options.policy, options.jobs, errors}, batches,
-             {.begun = begin, .ended = end});
-  if (width == 0) tellInOrder();
+  runTurns({options.session, options.policy, options.jobs, errors}, left,
+           {.begun = begin, .ended = end, .enough = options.observer.enough});
+  tellInOrder();
 }
 
 /// Of as many cases as have a record and none before them is missing.
@@ -72,27 +75,45 @@ void Run::tellInOrder() {
   }
 }
 
+bool Run::hadEnough() const {
+  return options.observer.enough && std::ranges::any_of(found, [&](const auto& f) {
+           return options.observer.enough(f.second);
+         });
+}
+
+/// Of the cases that have a record, whatever is missing before them.
+void Run::tellTheRest() {
+  for (std::size_t i = all.size(); i < cases.size(); ++i)
+    if (const auto next = found.find({0, cases[i].name}); next != found.end()) {
+      all.push_back(next->second);
+      options.observer.ended(all.back());
+    }
+}
+
 /// In the catalogue's order, so that what comes out does not depend on who came first.
-void Run::learnErrors(const std::vector<CaseName>& from) {
-  for (const CaseName& c : from)
-    for (const auto& [operation, error] : found.at({0, c.name}).measured) {
+void Run::learnErrors(const std::vector<Turn>& from) {
+  for (const Turn& t : from)
+    for (const auto& [operation, error] : found.at({0, t.name.name}).measured) {
       merge(errors, operation, error);
       measured = true;
     }
 }
 
-void Run::sweep(unsigned width) {
-  std::vector<CaseName> again;
-  for (const CaseRecord& r : all)
-    if (dependsOnWidth(r, width)) again.push_back({r.name, r.kernel});
-  runAt(width, again);
-  for (CaseRecord& r : all) {
-    const auto there = found.find({width, r.name});
-    if (there == found.end() || there->second.messages.empty()) continue;
-    const bool passedSoFar = !r.failed;
-    addFailures(r, width, there->second);
-    if (passedSoFar) options.observer.ended(r);
-  }
+void Run::sweep() {
+  const std::vector<unsigned> widths = otherWidths(options.prepared.gpu);
+  std::vector<Turn> again;
+  for (const unsigned width : widths)
+    for (const CaseRecord& r : all)
+      if (dependsOnWidth(r)) again.push_back({{r.name, r.kernel}, width});
+  runAll(again, again);
+  for (const unsigned width : widths)
+    for (CaseRecord& r : all) {
+      const auto there = found.find({width, r.name});
+      if (there == found.end() || there->second.messages.empty()) continue;
+      const bool passedSoFar = !r.failed;
+      addFailures(r, width, there->second);
+      if (passedSoFar) options.observer.ended(r);
+    }
 }
 
 }  // namespace gnomon

@@ -14,12 +14,13 @@ namespace gnomon {
 
 /// Told of the run as it goes on.
 struct RunObserver {
-  /// Cases that have ended and all of this pass; lanes of a subgroup, 0 for the device's own.
-  std::function<void(std::size_t ended, std::size_t all, unsigned lanes,
-                     const std::vector<std::string>& running)>
+  /// Cases that have ended and all of this pass.
+  std::function<void(std::size_t ended, std::size_t all, const std::vector<std::string>& running)>
       progress{};
   /// Of every case, in the order of the catalogue; again if it fails at another width only.
   std::function<void(const CaseRecord&)> ended{};
+  /// Whether the run is to stop with this case; null: never.
+  std::function<bool(const CaseRecord&)> enough{};
 };
 
 /// Everything that a run is made of; `results` may be null.
@@ -40,7 +41,7 @@ class Run {
   /// that the others know its errors. Then again at every other width where that may matter.
   void judge();
 
-  /// In the order of the catalogue.
+  /// In the order of the catalogue; where the observer had enough, of as many as have run.
   const std::vector<CaseRecord>& records() const { return all; }
   /// What is known of the device now, and whether this run has measured any of it.
   const DeviceErrors& deviceErrors() const { return errors; }
@@ -51,11 +52,14 @@ class Run {
  private:
   using Key = std::pair<unsigned, std::string>;  // width and case
 
-  /// Those of the cases that have no record yet.
-  void runAt(unsigned width, const std::vector<CaseName>& wanted);
+  /// Those of the turns that have no record yet.
+  void runAll(const std::vector<Turn>& wanted, const std::vector<Turn>& counted);
   void tellInOrder();
-  void learnErrors(const std::vector<CaseName>& from);
-  void sweep(unsigned width);
+  void tellTheRest();
+  void learnErrors(const std::vector<Turn>& from);
+  /// Again at other widths of a subgroup.
+  void sweep();
+  bool hadEnough() const;
 
   RunOptions options;
   std::vector<CaseName> cases;

@@ -32,10 +32,9 @@ std::string failureText(const Terminal& terminal, const CaseRecord& record,
 }
 
 /// A line of how far the run is and what runs now.
-std::string progressText(std::size_t ended, std::size_t all, unsigned lanes,
+std::string progressText(std::size_t ended, std::size_t all,
                          const std::vector<std::string>& running) {
-  const std::string again = lanes == 0 ? "" : fmt::format("in subgroups of {}: ", lanes);
-  return fmt::format("[{}/{}] {}{}", ended, all, again, fmt::join(running, ", "));
+  return fmt::format("[{}/{}] {}", ended, all, fmt::join(running, ", "));
 }
 
 const char* outcome(const CaseRecord& r) {
@@ -76,17 +75,20 @@ class Court {
 };
 
 /// Failures as they come, but for cases with a waiver: those are told of when all has run.
-RunObserver observerFor(Terminal& terminal, const Court& court, const SessionOptions& options) {
-  return {.progress =
-              [&terminal](std::size_t ended, std::size_t all, unsigned lanes,
-                          const std::vector<std::string>& running) {
-                terminal.progress(progressText(ended, all, lanes, running));
-              },
-          .ended =
-              [&](const CaseRecord& record) {
-                if (record.failed && court.waiver(record) == nullptr)
-                  terminal.print(failureText(terminal, record, options));
-              }};
+RunObserver observerFor(Terminal& terminal, const Court& court, const ValidateOptions& options) {
+  const auto fails = [&court](const CaseRecord& record) {
+    return record.failed && court.waiver(record) == nullptr;
+  };
+  return {
+      .progress =
+          [&terminal](std::size_t ended, std::size_t all, const std::vector<std::string>& running) {
+            terminal.progress(progressText(ended, all, running));
+          },
+      .ended =
+          [&, fails](const CaseRecord& record) {
+            if (fails(record)) terminal.print(failureText(terminal, record, options.session));
+          },
+      .enough = options.failFast ? fails : std::function<bool(const CaseRecord&)>()};
 }
 
 void tellOfWaivers(Terminal& terminal, const Court& court, const std::vector<CaseRecord>& records,
@@ -141,6 +143,7 @@ std::string fingerprint(const ValidateOptions& o, const Preparation& prepared) {
                         {"cases", s.cases.value_or(0)},
                         {"timeout", s.timeout ? s.timeout->count() : 0},
                         {"shrinks", s.shrinks},
+                        {"firstFailureOnly", s.firstFailureOnly},
                         {"replay", hashOf(contentOf(s.replay))},
                         {"prepared", toJson(prepared)},
                         {"policy", hashOf(contentOf(s.root / "tests/policy.json"))},
@@ -217,6 +220,7 @@ int validate(const ValidateOptions& given) {
   ValidateOptions options = given;
   options.session.root = sourceRoot();
   if (!options.session.replay.empty()) chooseReplayed(options);
+  options.session.firstFailureOnly = options.failFast;
   options.session.failures =
       options.out.empty() ? failuresCache() : std::filesystem::absolute(options.out) / "failures";
   for (const auto& [kernel, file] : options.session.kernels) findKernel(kernel);
@@ -236,7 +240,7 @@ int validate(const ValidateOptions& given) {
            .prepared = prepared,
            .jobs = options.jobs.value_or(defaultJobs()),
            .results = results ? &*results : nullptr,
-           .observer = observerFor(terminal, court, options.session)},
+           .observer = observerFor(terminal, court, options)},
           cases);
   if (run.takenFromFile() > 0)
     terminal.print(
@@ -244,6 +248,9 @@ int validate(const ValidateOptions& given) {
                     "was interrupted",
                     run.takenFromFile(), cases.size(), options.out.string()));
   run.judge();
+  if (const std::size_t left = cases.size() - run.records().size(); left > 0)
+    terminal.print(fmt::format("stopped at the first failure: {} of {} cases have not run", left,
+                               cases.size()));
   refuseUnusable(options, run.records());
   const std::vector<CaseRecord> records = court.judged(run.records());
   tellOfWaivers(terminal, court, records, options.session);

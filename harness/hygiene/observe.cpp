@@ -146,23 +146,25 @@ bool writesNarrow(const Subject& subject, const Stimulus& stimulus) {
 }  // namespace
 
 Observation observe(const Subject& subject, const Stimulus& stimulus, Watch watch) {
-  const bool all = watch == Watch::kAll;
+  const bool asItIs = watch == Watch::kAll || watch == Watch::kInOrder;
+  const bool reordered = watch == Watch::kAll || watch == Watch::kTwins;
+  const bool twinAlone = watch == Watch::kTwinAlone;
   Observation seen;
   seen.unmapped = {subject.interface().unmapped.begin(), subject.interface().unmapped.end()};
   {
     Resources resources(subject, stimulus, Target::kFloat);
     Observer observer(subject, resources, seen);
-    if (all) observer.watch(subject.plain(), "kernel", seen.plain);
+    if (asItIs) observer.watch(subject.plain(), "kernel", seen.plain);
     observer.watch(subject.twin(), "strict twin", seen.twin);
-    if (all) observer.compareArrangements();
+    if (reordered) observer.compareArrangements();
   }
-  if (!all) seen.plain = seen.twin;
-  if (all && writesNarrow(subject, stimulus)) {
+  if (!twinAlone && writesNarrow(subject, stimulus)) {
     Resources resources(subject, stimulus, Target::kContract);
     Observer observer(subject, resources, seen);
-    observer.watch(subject.plain(), "kernel", seen.plain);
+    if (asItIs) observer.watch(subject.plain(), "kernel", seen.plain);
     observer.watch(subject.twin(), "strict twin", seen.twin);
   }
+  if (!asItIs) seen.plain = seen.twin;
   for (const std::string& message : subject.gpu().takeMessages())
     seen.findings.push_back("validation layer: " + message);
   return seen;

@@ -27,7 +27,9 @@ struct Observation {
 /// How much is watched.
 enum class Watch {
   kAll,
-  kTwinAlone  ///< a part of it: the strict twin into float images; `plain` repeats what it gave
+  kInOrder,   ///< all but the order twin
+  kTwins,     ///< all but the module as it is: `plain` repeats what its strict twin gave
+  kTwinAlone  ///< the strict twin into float images, in its own order; `plain` repeats what it gave
 };
 
 /// Outputs and guard bands are poisoned before every run, with one pattern in the first and another

@@ -60,23 +60,21 @@ void unpack(const Place& place, std::span<const std::byte> source, std::span<std
   }
 }
 
-Bytes inConvention(std::span<const std::byte> rows, PixelFormat format, unsigned height,
-                   const std::string& meaning, const Conventions& conventions, Way way) {
-  Bytes result(rows.begin(), rows.end());
+void convertRows(std::span<std::byte> rows, PixelFormat format, unsigned height,
+                 const std::string& meaning, const Conventions& conventions, Way way) {
   const std::size_t rowBytes = rows.size() / height;
   if (says(conventions, "y", "up"))
-    for (unsigned y = 0; y < height; ++y)
-      std::memcpy(result.data() + y * rowBytes, rows.data() + (height - 1 - y) * rowBytes,
-                  rowBytes);
+    for (unsigned y = 0; y < height / 2; ++y)
+      std::ranges::swap_ranges(rows.subspan(y * rowBytes, rowBytes),
+                               rows.subspan((height - 1 - y) * rowBytes, rowBytes));
   const bool floats = bytesPerPixel(format) == kWord * channels(format);
   if (meaning == "depth" && floats && !conventions.empty())  // the first channel is the depth
-    for (std::size_t at = 0; at < result.size(); at += bytesPerPixel(format)) {
+    for (std::size_t at = 0; at < rows.size(); at += bytesPerPixel(format)) {
       float x = 0;
-      std::memcpy(&x, result.data() + at, kWord);
+      std::memcpy(&x, rows.data() + at, kWord);
       x = converted(x, meaning, conventions, way);
-      std::memcpy(result.data() + at, &x, kWord);
+      std::memcpy(rows.data() + at, &x, kWord);
     }
-  return result;
 }
 
 }  // namespace gnomon

@@ -30,8 +30,8 @@ void pack(const Place& place, std::span<const std::byte> element, std::span<std:
 void unpack(const Place& place, std::span<const std::byte> source, std::span<std::byte> element,
             const Conventions& conventions);
 
-/// A picture's rows in the other convention: from below where "y" is "up", depths converted.
-Bytes inConvention(std::span<const std::byte> rows, PixelFormat format, unsigned height,
-                   const std::string& meaning, const Conventions& conventions, Way way);
+/// Puts a picture's rows into the other convention: from below where "y" is "up", depths converted.
+void convertRows(std::span<std::byte> rows, PixelFormat format, unsigned height,
+                 const std::string& meaning, const Conventions& conventions, Way way);
 
 }  // namespace gnomon

@@ -173,7 +173,6 @@ void Resources::upload() {
     gpu.fill(m.buffer, kGuardPattern);
     gpu.upload(m.buffer, m.before, m.content);
   }
-  uploadImages();
 }
 
 void Resources::poisonOutputs(std::uint32_t poison) {

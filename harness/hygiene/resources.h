@@ -102,7 +102,8 @@ class Resources {
   void addOutputImage(const OutputImage& output, Target target);
   void bind();
   void bindImages();
-  void uploadImages();
+  /// Its texels in the conventions of the module.
+  Bytes inConvention(const InputImage& input) const;
   void poisonImages(std::uint32_t poison);
   void poisonOutputs(std::uint32_t poison);
   void checkGuards(const Memory& memory, const Bytes& whole, std::uint32_t poison,

@@ -59,10 +59,15 @@ std::array<std::byte, 16> repeated(std::uint32_t pattern) {
   return bytes;
 }
 
-std::size_t bytesOf(const ImageDescription& image) {
-  std::size_t bytes = 0;
-  for (unsigned mip = 0; mip < image.mips; ++mip) bytes += image.layers * mipBytes(image, mip);
-  return bytes;
+/// Calls f(rows, height) for every level of every layer.
+template <class Texels, class F>
+void forEachLevel(const ImageDescription& image, Texels texels, const F& f) {
+  std::size_t at = 0;
+  for (unsigned layer = 0; layer < image.layers; ++layer)
+    for (unsigned mip = 0; mip < image.mips; ++mip) {
+      f(texels.subspan(at, mipBytes(image, mip)), mipSize(image, mip)[1]);
+      at += mipBytes(image, mip);
+    }
 }
 
 }  // namespace
@@ -105,12 +110,24 @@ std::string Output::place(std::size_t element) const {
 }
 
 void Resources::addInputImage(const InputImage& input) {
-  const std::size_t wanted = bytesOf(input.description);
+  const std::size_t wanted = imageBytes(input.description);
   if (input.texels.size() != wanted)
     throw std::logic_error(fmt::format("'{}' has {} bytes of texels, its description {}",
                                        input.image, input.texels.size(), wanted));
-  inImages.push_back(gpu.allocateImage(input.description));
+  // Once: a module can only read it.
+  const Bytes theirs = conventions.empty() ? Bytes{} : inConvention(input);
+  inImages.push_back(
+      gpu.allocateImage(input.description, conventions.empty() ? input.texels : theirs));
   traffic += wanted;
+}
+
+Bytes Resources::inConvention(const InputImage& input) const {
+  Bytes texels(input.texels.begin(), input.texels.end());
+  const std::string& meaning = record.image(input.image).meaning;
+  forEachLevel(input.description, std::span(texels), [&](auto rows, unsigned height) {
+    convertRows(rows, input.description.format, height, meaning, conventions, Way::kIn);
+  });
+  return texels;
 }
 
 void Resources::addOutputImage(const OutputImage& output, Target target) {
@@ -138,7 +155,7 @@ void Resources::addOutputImage(const OutputImage& output, Target target) {
            .given = {}};
   o.given.assign(o.layout.size / kWord, true);
   o.image = gpu.allocateImage(description);
-  traffic += bytesOf(description);
+  traffic += imageBytes(description);
   out.push_back(std::move(o));
 }
 
@@ -160,23 +177,6 @@ void Resources::bindImages() {
                                           : sampler == samplers.end() ? &ownSampler
                                                                       : &sampler->second,
                                .asArray = i.asArray});
-  }
-}
-
-void Resources::uploadImages() {
-  for (std::size_t i = 0; i < inImages.size(); ++i) {
-    const InputImage& given = stimulus.inputImages[i];
-    const ImageSpec& spec = record.image(given.image);
-    std::size_t at = 0;
-    for (unsigned layer = 0; layer < given.description.layers; ++layer)
-      for (unsigned mip = 0; mip < given.description.mips; ++mip) {
-        const std::size_t bytes = mipBytes(given.description, mip);
-        const auto [width, height] = mipSize(given.description, mip);
-        const Bytes theirs = inConvention(given.texels.subspan(at, bytes), given.description.format,
-                                          height, spec.meaning, conventions, Way::kIn);
-        gpu.uploadImage(inImages[i], layer, mip, theirs);
-        at += bytes;
-      }
   }
 }
 
@@ -213,17 +213,12 @@ Bytes Resources::cropped(const Output& output, Bytes texels, std::uint32_t poiso
 
 Bytes Resources::downloadImage(const Output& output) const {
   const ImageDescription& image = output.image.description();
-  Bytes texels(bytesOf(image));
-  std::size_t at = 0;
-  for (unsigned layer = 0; layer < image.layers; ++layer)
-    for (unsigned mip = 0; mip < image.mips; ++mip) {
-      const auto rows = std::span(texels).subspan(at, mipBytes(image, mip));
-      gpu.downloadImage(output.image, layer, mip, rows);
-      const Bytes ours = inConvention(rows, image.format, mipSize(image, mip)[1], output.meaning,
-                                      conventions, Way::kOut);
-      std::ranges::copy(ours, rows.begin());
-      at += rows.size();
-    }
+  Bytes texels(imageBytes(image));
+  gpu.downloadImage(output.image, texels);
+  if (!conventions.empty())
+    forEachLevel(image, std::span(texels), [&](auto rows, unsigned height) {
+      convertRows(rows, image.format, height, output.meaning, conventions, Way::kOut);
+    });
   return widen(std::move(texels), image.format);
 }
 

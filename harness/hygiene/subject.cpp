@@ -44,12 +44,6 @@ std::vector<std::string> featuresOf(const Reflection& reflection) {
   return features;
 }
 
-bool asksForSubgroups(const Reflection& reflection) {
-  return std::ranges::any_of(reflection.capabilities, [](const std::string& capability) {
-    return capability.starts_with("GroupNonUniform") || capability.starts_with("Subgroup");
-  });
-}
-
 }  // namespace
 
 Subject::Subject(Gpu& gpu, const KernelRecord& record, KernelModule module)
@@ -60,7 +54,6 @@ Subject::Subject(Gpu& gpu, const KernelRecord& record, KernelModule module)
   mapping = interfaceOf(record, reflection, adapter, file);
   if (const auto why = gpu.info().lacks(featuresOf(reflection))) throw Unsupported(*why);
   if (adapter != nullptr) manners = adapter->conventions;
-  subgroups = asksForSubgroups(reflection);
   const StrictOptions strict{.signedZeroInfNanPreserve = gpu.info().signedZeroInfNanFloat32,
                              .roundingModeRte = gpu.info().roundingRteFloat32};
   twinModule = strictTwin(module.words, strict);

@@ -28,7 +28,6 @@ class Subject {
   /// Threads may see each other's work: by shared memory, atomics, subgroup operations, or storage
   /// that is both read and written.
   bool threadsCommunicate() const { return communicates; }
-  bool usesSubgroups() const { return subgroups; }
   /// The strict twin with the order of groups and subgroups turned round, for a kernel whose
   /// threads communicate; programmer error for any other.
   const GpuProgram& orderTwin() const;
@@ -44,7 +43,7 @@ class Subject {
   Interface mapping;
   std::map<std::string, std::string> manners;
   SpirvWords plainModule, twinModule;
-  bool communicates = false, subgroups = false;
+  bool communicates = false;
   GpuProgram twinProgram;
   mutable std::optional<GpuProgram> plainProgram{}, turned{};
   mutable std::optional<std::map<unsigned, GpuProgram>> resized{};

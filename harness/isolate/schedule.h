@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,21 +12,34 @@
 
 namespace gnomon {
 
+/// A case, and the width of a subgroup that it runs at, in bits, as harness/isolate/sweep.h counts
+/// them; 0: the device's own.
+struct Turn {
+  CaseName name{};
+  unsigned width = 0;
+};
+
 /// Cases for one worker.
 struct Batch {
   std::vector<CaseName> cases{};
-  std::map<std::string, std::string> environment{};  ///< on top of ours
+  unsigned width = 0;  ///< as Turn::width
 };
 
-/// Cuts cases into batches of one stage and at most so many, in order. Those of a foreign kernel
-/// stay by themselves: their workers have a limit of memory.
-std::vector<Batch> batchesOf(const std::vector<CaseName>& cases, const SessionOptions& session,
-                             std::size_t atMost);
+/// Cuts turns into batches of one stage and one width, in order. The first hold most, so that few
+/// workers are started and all end at about the same time: each takes half of what a worker's even
+/// share of all that is left would be, or `fewest`. A kernel is cut in two only where it would make
+/// a batch longer than that by more than `fewest`: each worker compiles it again. Cases of a
+/// foreign kernel stay by themselves: their workers have a limit of memory.
+std::vector<Batch> batchesOf(const std::vector<Turn>& turns, const SessionOptions& session,
+                             unsigned jobs, std::size_t fewest);
 
 /// Told by one worker at a time.
 struct ScheduleObserver {
-  std::function<void(const CaseName&)> begun{};
-  std::function<void(CaseRecord)> ended{};  ///< once for each case
+  std::function<void(const Turn&)> begun{};
+  std::function<void(unsigned width, CaseRecord)> ended{};  ///< once for each turn
+  /// Whether this record is all that was wanted: then nothing more is heard, workers are stopped as
+  /// soon as they say something, and what has not run by then does not run.
+  std::function<bool(const CaseRecord&)> enough{};
 };
 
 struct Schedule {
@@ -37,11 +49,11 @@ struct Schedule {
   std::optional<DeviceErrors> errors{};  ///< of the device, known so far
 };
 
-/// Runs every case of the batches. One that takes its worker along, or does not end in time, has
+/// Runs every turn, in batches. A case that takes its worker along, or does not end in time, has
 /// failed with a message that says so; the rest of its batch goes on in a fresh worker. Throws
 /// UsageError and DeviceError where a worker exits so before its first case.
-void runBatches(const Schedule& schedule, const std::vector<Batch>& batches,
-                const ScheduleObserver& observer);
+void runTurns(const Schedule& schedule, const std::vector<Turn>& turns,
+              const ScheduleObserver& observer);
 
 /// How many workers run at a time where nobody says: one a core, since a case waits for one thing
 /// after another (compiler, device, judge), but at most 8, since each may take half a gibibyte.

@@ -1,5 +1,6 @@
 #include "harness/isolate/worker.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <new>
 
 #include <fmt/format.h>
@@ -56,6 +58,15 @@ void dieWithoutMemory() {
   [[maybe_unused]] const auto written =
       write(STDERR_FILENO, text.data(), static_cast<std::size_t>(length));
   _exit(1);
+}
+
+/// What a case gives back the next one takes: images of a whole frame come and go, and pages that
+/// the system takes and clears anew cost a tenth of a run.
+void keepMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most that it can be
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
+#endif
 }
 
 std::vector<CaseName> namedCases(const std::vector<std::string>& names) {
@@ -131,13 +142,12 @@ void runToFailures(Session& session, const std::vector<CaseName>& cases, unsigne
   session.watchOnly(Watch::kTwinAlone);
   const Round twinAlone = runUntil(failures, session, cases, observer);
   if (twinAlone.failures > 0) return;
-  session.watchOnly(Watch::kAll);
+  session.watchOnly(session.options().watch);
   runUntil(failures, session, twinAlone.observing, observer);
 }
 
 void judgeMutants(Session& session, const WorkerTask& task, const std::vector<CaseName>& cases,
-                  Observer observer) {
-  observer.endsCaseAtFailure = true;
+                  const Observer& observer) {
   const KernelModule module = moduleOf(task.session, findKernel(task.mutated));
   for (Mutant& m : mutantsNamed(module.words, task.mutants)) {
     say(kMutant, m.id);
@@ -167,6 +177,7 @@ void judgeModels(Session& session, const WorkerTask& task) {
 
 void serve(const WorkerTask& task) {
   std::set_new_handler(dieWithoutMemory);
+  keepMemory();
   const std::vector<CaseName> cases = namedCases(task.cases);
   Session session(task.session);
   if (task.errors) session.know(*task.errors);
@@ -175,7 +186,8 @@ void serve(const WorkerTask& task) {
   session.onProgress = [] { say(kFurther, ""); };
   const Observer observer{
       .begin = [](const CaseName& c, std::size_t, std::size_t) { begin(c.name); },
-      .end = [&](const CaseRecord& r) { end(session, r); }};
+      .end = [&](const CaseRecord& r) { end(session, r); },
+      .endsCaseAtFailure = task.session.firstFailureOnly || !task.mutants.empty()};
   if (task.mutants.empty()) return runCases(session, cases, observer);
   judgeMutants(session, task, cases, observer);
 }
@@ -207,7 +219,9 @@ class Listener {
   } catch (const UsageError&) {  // it lost its mind: what it does not say well, it has not said
   }
 
-  Clock::time_point until() const { return deadline; }
+  Clock::time_point until() const {
+    return options.stopped && options.stopped() ? Clock::now() : deadline;
+  }
   WorkerReport report{};
 
  private:

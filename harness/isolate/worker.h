@@ -29,7 +29,8 @@ struct WorkerOptions {
   std::chrono::milliseconds limit{60'000};  ///< of each case, of what comes before and after it
   /// Of one case, where that it hangs is all that is asked: no grace.
   std::function<std::chrono::milliseconds(const std::string& name)> limitOf{};
-  std::uint64_t memoryBytes = 0;                         ///< as ProcessOptions::memoryBytes
+  std::uint64_t memoryBytes = 0;    ///< as ProcessOptions::memoryBytes
+  std::function<bool()> stopped{};  ///< whether to stop it as soon as it has something to say
   std::function<void(const std::string& name)> begun{};  ///< told of every case as it begins
   std::function<void(CaseRecord)> ended{};               ///< ... and as it ends
   std::function<void(const std::string& id)> mutant{};   ///< told of every mutant as it begins

@@ -34,8 +34,11 @@ std::string gist(const CaseRecord& record) {
 struct Chunk {
   std::vector<std::size_t> mutants{};
   std::vector<CaseName> cases{};
-  std::map<std::string, std::string> environment{};
-  std::string where{};  ///< of that environment: " in subgroups of 4"
+  unsigned width = 0;  ///< of a subgroup, as harness/isolate/sweep.h counts it
+
+  std::string where() const {
+    return width == 0 ? "" : fmt::format(" in subgroups of {}", lanesOf(width));
+  }
 };
 
 class Campaign {
@@ -52,15 +55,15 @@ class Campaign {
     std::vector<std::size_t> first, others;
     for (std::size_t i = 0; i < mutants.size(); ++i)
       (i % kOneOf == 0 ? first : others).push_back(i);
-    const std::vector<unsigned> widths = widthsFor(gpu);
+    std::vector<unsigned> widths = otherWidths(gpu);
+    if (casesOfCommunicating().empty()) widths.clear();
     last = widths.empty();
-    runAll(first, allCases(), {}, {});
+    runAll(first, allCases());
     putKillersFirst();
-    runAll(others, allCases(), {}, {});
+    runAll(others, allCases());
     for (const unsigned width : widths) {
       last = width == widths.back();
-      runAll(survivors(), casesAt(width), environmentFor(width),
-             fmt::format(" in subgroups of {}", lanesOf(width)));
+      runAll(survivors(), casesOfCommunicating(), width);
     }
   }
 
@@ -80,19 +83,11 @@ class Campaign {
                              [&](const Witness& w) { return kills[w.name.name]; });
   }
 
-  std::vector<CaseName> casesAt(unsigned width) const {
+  std::vector<CaseName> casesOfCommunicating() const {
     std::vector<CaseName> cases;
     for (const Witness& w : witnesses)
-      if (dependsOnWidth({.threadsCommunicate = w.communicates, .usesSubgroups = w.usesSubgroups},
-                         width))
-        cases.push_back(w.name);
+      if (w.communicates) cases.push_back(w.name);
     return cases;
-  }
-
-  std::vector<unsigned> widthsFor(const GpuInfo& gpu) const {
-    std::vector<unsigned> widths = otherWidths(gpu);
-    std::erase_if(widths, [&](unsigned w) { return casesAt(w).empty(); });
-    return widths;
   }
 
   std::vector<std::size_t> survivors() const {
@@ -105,7 +100,7 @@ class Campaign {
   /// Chunks of at most so many mutants: starting a worker costs as much as judging two or three,
   /// and at the end every core should have something to do.
   void runAll(const std::vector<std::size_t>& chosen, const std::vector<CaseName>& cases,
-              const std::map<std::string, std::string>& environment, const std::string& where) {
+              unsigned width = 0) {
     constexpr std::size_t kMost = 16;
     const std::size_t share = chosen.size() / (2 * std::size_t{schedule.jobs}) + 1;
     const std::size_t size = std::min(kMost, share);
@@ -113,8 +108,7 @@ class Campaign {
       const auto from = chosen.begin() + static_cast<std::ptrdiff_t>(begin);
       const auto to =
           chosen.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, chosen.size()));
-      chunks.push_back(
-          {.mutants = {from, to}, .cases = cases, .environment = environment, .where = where});
+      chunks.push_back({.mutants = {from, to}, .cases = cases, .width = width});
     }
     {
       std::vector<std::jthread> threads;
@@ -142,7 +136,7 @@ class Campaign {
   void run(Chunk chunk) {
     while (!chunk.mutants.empty()) {
       const WorkerOptions options = optionsFor(chunk);
-      WorkerTask task{.session = schedule.session,
+      WorkerTask task{.session = sessionAt(chunk.width, schedule.session),
                       .errors = schedule.errors,
                       .mutated = kernel,
                       .kills = sought};
@@ -157,7 +151,7 @@ class Campaign {
   }
 
   WorkerOptions optionsFor(Chunk& chunk) {
-    return {.environment = chunk.environment,
+    return {.environment = environmentFor(chunk.width),
             .limit = caseLimit(schedule.session, schedule.policy),
             .limitOf = [this](const std::string& name) { return patience(name); },
             .memoryBytes = memoryLimit(schedule.policy, "foreignGibibytes"),
@@ -165,7 +159,7 @@ class Campaign {
                 [this, &chunk](CaseRecord record) {
                   if (record.failed && !chunk.mutants.empty())
                     fates[chunk.mutants.front()].kills.push_back(
-                        {record.name + chunk.where, gist(record)});
+                        {record.name + chunk.where(), gist(record)});
                 },
             .mutant =
                 [this, &chunk](const std::string& id) {
@@ -202,7 +196,7 @@ class Campaign {
     const bool recorded = !fate.kills.empty() && report.running.empty();
     if (!recorded) {
       const std::string by = report.running.empty() ? chunk.cases.front().name : report.running;
-      fate.kills.push_back({by + chunk.where, "the worker " + firstLine(death)});
+      fate.kills.push_back({by + chunk.where(), "the worker " + firstLine(death)});
     }
     const std::string& by = fate.kills.back().by;
     auto next = std::ranges::find_if(chunk.cases,
@@ -211,8 +205,7 @@ class Campaign {
     if (fate.kills.size() < sought && next != chunk.cases.end()) {
       Chunk rest{.mutants = {chunk.mutants.front()},
                  .cases = {next, chunk.cases.end()},
-                 .environment = chunk.environment,
-                 .where = chunk.where};
+                 .width = chunk.width};
       chunk.mutants.erase(chunk.mutants.begin());
       run(std::move(rest));
     } else {
@@ -243,17 +236,17 @@ std::vector<Witness> witnessesOf(const Schedule& schedule, const std::string& ke
   });
   std::vector<Witness> witnesses;
   std::string broken;
-  const auto batches =
-      batchesOf(cases, schedule.session, static_cast<std::size_t>(schedule.policy["batchCases"]));
-  runBatches(schedule, batches,
-             {.begun = [](const CaseName&) {},
-              .ended =
-                  [&](CaseRecord r) {
-                    if (r.failed) broken += (broken.empty() ? "" : ", ") + r.name;
-                    if (r.skipped || r.unsupported) return;
-                    witnesses.push_back(
-                        {{r.name, r.kernel}, r.seconds, r.threadsCommunicate, r.usesSubgroups});
-                  }});
+  std::vector<Turn> turns;
+  for (const CaseName& c : cases) turns.push_back({c});
+  runTurns(schedule, turns,
+           {.begun = [](const Turn&) {},
+            .ended =
+                [&](unsigned, CaseRecord r) {
+                  if (r.failed) broken += (broken.empty() ? "" : ", ") + r.name;
+                  if (r.skipped || r.unsupported) return;
+                  witnesses.push_back({{r.name, r.kernel}, r.seconds, r.threadsCommunicate});
+                },
+            .enough = {}});
   if (!broken.empty())
     throw CaseFailure(
         fmt::format("{} fails {} without being mutated, so nothing can be said of its mutants.\n"

@@ -18,7 +18,6 @@ struct Witness {
   CaseName name{};
   double seconds = 0;
   bool communicates = false;  ///< CaseRecord::threadsCommunicate
-  bool usesSubgroups = false;
 };
 
 /// The cases that run the kernel, or those of one such kind, cheapest first, after they have passed

@@ -67,6 +67,12 @@ void requireBytes(const ImageDescription& image, unsigned layer, unsigned mip, s
                                        mip, mipBytes(image, mip)));
 }
 
+void requireAllBytes(const ImageDescription& image, std::size_t bytes) {
+  if (bytes != imageBytes(image))
+    throw std::logic_error(
+        fmt::format("{} bytes for a GPU image, which has {}", bytes, imageBytes(image)));
+}
+
 /// What no device could make, and no driver need refuse.
 void requireSound(const ImageDescription& image) {
   if (image.width == 0 || image.height == 0 || image.layers == 0 || image.mips == 0)
@@ -262,13 +268,25 @@ void Gpu::fill(const GpuBuffer& buffer, std::uint32_t pattern) {
   if (buffer.size() > 0) impl->device->fill(buffer.impl->buffer, pattern);
 }
 
-GpuImage Gpu::allocateImage(const ImageDescription& description) {
-  requireSound(description);
+GpuImage Gpu::Impl::makeImage(const ImageDescription& description,
+                              std::span<const std::byte> texels) const {
   GpuImage image;
   image.impl = std::make_unique<GpuImage::Impl>();
-  image.impl->device = impl->device;
-  image.impl->image = impl->device->makeImage(description);
+  image.impl->device = device;
+  image.impl->image = device->makeImage(description, texels);
   return image;
+}
+
+GpuImage Gpu::allocateImage(const ImageDescription& description) {
+  requireSound(description);
+  return impl->makeImage(description);
+}
+
+GpuImage Gpu::allocateImage(const ImageDescription& description,
+                            std::span<const std::byte> texels) {
+  requireSound(description);
+  requireAllBytes(description, texels.size());
+  return impl->makeImage(description, texels);
 }
 
 void Gpu::uploadImage(const GpuImage& to, unsigned layer, unsigned mip,
@@ -281,6 +299,11 @@ void Gpu::downloadImage(const GpuImage& from, unsigned layer, unsigned mip,
                         std::span<std::byte> tightRows) {
   requireBytes(from.description(), layer, mip, tightRows.size());
   impl->device->download(from.impl->image, layer, mip, tightRows);
+}
+
+void Gpu::downloadImage(const GpuImage& from, std::span<std::byte> texels) {
+  requireAllBytes(from.description(), texels.size());
+  impl->device->download(from.impl->image, texels);
 }
 
 void Gpu::fillImage(const GpuImage& image, const std::array<std::byte, 16>& pixelPattern) {

@@ -111,6 +111,8 @@ struct ImageDescription {
 std::array<unsigned, 2> mipSize(const ImageDescription& image, unsigned mip);
 /// Bytes of one mip level of one layer, its rows tight.
 std::size_t mipBytes(const ImageDescription& image, unsigned mip);
+/// Of all its layers and mip levels.
+std::size_t imageBytes(const ImageDescription& image);
 /// Mip levels of such an image down to 1 x 1.
 unsigned fullMipCount(unsigned width, unsigned height);
 
@@ -279,6 +281,9 @@ class Gpu {
   /// format, sides, layers), std::logic_error where nothing has (no pixels, more mip levels than
   /// down to 1 x 1, a cube without six square faces), and GpuError when memory is out.
   GpuImage allocateImage(const ImageDescription& description);
+  /// The same of these texels: imageBytes() of them, layer by layer, each with its mip levels, rows
+  /// tight and the first one first; else std::logic_error.
+  GpuImage allocateImage(const ImageDescription& description, std::span<const std::byte> texels);
   /// One mip level of one layer at once, its rows tight and the first one first; mipBytes() of
   /// them, else std::logic_error. Throws std::out_of_range past the last layer or mip level. Bits
   /// stay what they are, but depths must lie in [0, 1] (Vulkan's rule for copies into D32).
@@ -286,6 +291,8 @@ class Gpu {
                    std::span<const std::byte> tightRows);
   void downloadImage(const GpuImage& from, unsigned layer, unsigned mip,
                      std::span<std::byte> tightRows);
+  /// The whole image, its texels in the order of allocateImage().
+  void downloadImage(const GpuImage& from, std::span<std::byte> texels);
   /// Repeats one pixel, the first bytesPerPixel() bytes of the pattern, over every layer and mip.
   void fillImage(const GpuImage& image, const std::array<std::byte, 16>& pixelPattern);
 

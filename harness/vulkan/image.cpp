@@ -54,6 +54,12 @@ std::size_t mipBytes(const ImageDescription& image, unsigned mip) {
   return std::size_t{width} * height * bytesPerPixel(image.format);
 }
 
+std::size_t imageBytes(const ImageDescription& image) {
+  std::size_t bytes = 0;
+  for (unsigned mip = 0; mip < image.mips; ++mip) bytes += image.layers * mipBytes(image, mip);
+  return bytes;
+}
+
 unsigned fullMipCount(unsigned width, unsigned height) {
   return static_cast<unsigned>(std::bit_width(std::max(width, height)));
 }
@@ -162,6 +168,35 @@ std::size_t bytesOf(const VkBufferImageCopy& strip, PixelFormat format) {
   return std::size_t{strip.imageExtent.width} * strip.imageExtent.height * bytesPerPixel(format);
 }
 
+/// Of the whole image, in the order of its texels: layer by layer, each with its mip levels.
+std::vector<VkBufferImageCopy> allStrips(const ImageDescription& image) {
+  std::vector<VkBufferImageCopy> all;
+  for (unsigned layer = 0; layer < image.layers; ++layer)
+    for (unsigned mip = 0; mip < image.mips; ++mip)
+      std::ranges::copy(stripsOf(image, layer, mip), std::back_inserter(all));
+  return all;
+}
+
+/// Strips that lie one behind the other in the staging buffer.
+struct StagedStrips {
+  std::vector<VkBufferImageCopy> strips{};
+  std::size_t bytes = 0;
+};
+
+/// Strips in order, as many together as fit the staging buffer: a submission costs more than most
+/// of them.
+std::vector<StagedStrips> stagesOf(std::span<const VkBufferImageCopy> strips, PixelFormat format) {
+  std::vector<StagedStrips> stages;
+  for (VkBufferImageCopy strip : strips) {
+    const std::size_t bytes = bytesOf(strip, format);
+    if (stages.empty() || stages.back().bytes + bytes > kStagingBytes) stages.emplace_back();
+    strip.bufferOffset = stages.back().bytes;
+    stages.back().strips.push_back(strip);
+    stages.back().bytes += bytes;
+  }
+  return stages;
+}
+
 VkSamplerAddressMode addressMode(SamplerDescription::Address address) {
   switch (address) {
     case SamplerDescription::Address::kClamp:
@@ -184,7 +219,7 @@ VkFormatFeatureFlags formatFeatures(const Adapter& adapter, PixelFormat format) 
   return properties.optimalTilingFeatures;
 }
 
-Image Device::makeImage(const ImageDescription& description) {
+Image Device::makeImage(const ImageDescription& description, std::span<const std::byte> texels) {
   requireAlive();
   Image image;
   image.description = description;
@@ -198,36 +233,57 @@ Image Device::makeImage(const ImageDescription& description) {
   vkGetImageMemoryRequirements(owner.handle, made, &needs);
   image.memory = allocate(needs.size, memoryType(needs.memoryTypeBits, Memory::device));
   check(vkBindImageMemory(owner.handle, made, image.memory.get(), 0), "vkBindImageMemory");
-  toGeneralLayout(begin(), image);
-  finish(kTransferLimit);
+  if (!texels.empty()) {
+    upload(image, allStrips(description), texels, /*fresh=*/true);
+  } else {
+    toGeneralLayout(begin(), image);
+    finish(kTransferLimit);
+  }
   return image;
+}
+
+void Device::upload(const Image& to, std::span<const VkBufferImageCopy> strips,
+                    std::span<const std::byte> texels, bool fresh) {
+  for (const StagedStrips& stage : stagesOf(strips, to.description.format)) {
+    std::memcpy(staging().mapped, texels.data(), stage.bytes);
+    texels = texels.subspan(stage.bytes);
+    const VkCommandBuffer commands = begin();
+    if (fresh) toGeneralLayout(commands, to);
+    fresh = false;
+    vkCmdCopyBufferToImage(commands, staging().buffer.get(), to.image.get(),
+                           VK_IMAGE_LAYOUT_GENERAL, static_cast<std::uint32_t>(stage.strips.size()),
+                           stage.strips.data());
+    finish(kTransferLimit);
+  }
+}
+
+void Device::download(const Image& from, std::span<const VkBufferImageCopy> strips,
+                      std::span<std::byte> texels) {
+  for (const StagedStrips& stage : stagesOf(strips, from.description.format)) {
+    const VkCommandBuffer commands = begin();
+    vkCmdCopyImageToBuffer(commands, from.image.get(), VK_IMAGE_LAYOUT_GENERAL,
+                           staging().buffer.get(), static_cast<std::uint32_t>(stage.strips.size()),
+                           stage.strips.data());
+    finish(kTransferLimit);
+    std::memcpy(texels.data(), staging().mapped, stage.bytes);
+    texels = texels.subspan(stage.bytes);
+  }
 }
 
 void Device::upload(const Image& to, unsigned layer, unsigned mip,
                     std::span<const std::byte> rows) {
   requireAlive();
-  for (const VkBufferImageCopy& strip : stripsOf(to.description, layer, mip)) {
-    const std::size_t bytes = bytesOf(strip, to.description.format);
-    std::ranges::copy(rows.first(bytes), staging().mapped);
-    rows = rows.subspan(bytes);
-    const VkCommandBuffer commands = begin();
-    vkCmdCopyBufferToImage(commands, staging().buffer.get(), to.image.get(),
-                           VK_IMAGE_LAYOUT_GENERAL, 1, &strip);
-    finish(kTransferLimit);
-  }
+  upload(to, stripsOf(to.description, layer, mip), rows);
 }
 
 void Device::download(const Image& from, unsigned layer, unsigned mip, std::span<std::byte> rows) {
   requireAlive();
-  for (const VkBufferImageCopy& strip : stripsOf(from.description, layer, mip)) {
-    const VkCommandBuffer commands = begin();
-    vkCmdCopyImageToBuffer(commands, from.image.get(), VK_IMAGE_LAYOUT_GENERAL,
-                           staging().buffer.get(), 1, &strip);
-    finish(kTransferLimit);
-    const std::size_t bytes = bytesOf(strip, from.description.format);
-    std::copy_n(staging().mapped, bytes, rows.data());
-    rows = rows.subspan(bytes);
-  }
+  download(from, stripsOf(from.description, layer, mip), rows);
+}
+
+void Device::download(const Image& from, std::span<std::byte> texels) {
+  requireAlive();
+  download(from, allStrips(from.description), texels);
 }
 
 /// Not vkCmdClearColorImage: it takes a colour, and conversion may lose the pattern's bits.
@@ -241,10 +297,7 @@ void Device::fill(const Image& image, const std::array<std::byte, 16>& pixel) {
   for (std::size_t i = 0; i < bytes; i += cell.size())
     std::memcpy(staging().mapped + i, cell.data(), cell.size());
 
-  std::vector<VkBufferImageCopy> all;
-  for (unsigned mip = 0; mip < description.mips; ++mip)
-    for (unsigned layer = 0; layer < description.layers; ++layer)
-      std::ranges::copy(stripsOf(description, layer, mip), std::back_inserter(all));
+  const std::vector<VkBufferImageCopy> all = allStrips(description);
   const VkCommandBuffer commands = begin();
   vkCmdCopyBufferToImage(commands, staging().buffer.get(), image.image.get(),
                          VK_IMAGE_LAYOUT_GENERAL, static_cast<std::uint32_t>(all.size()),

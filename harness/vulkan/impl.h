@@ -46,6 +46,8 @@ struct Gpu::Impl {
   static std::vector<vulkan::Command> resolve(vulkan::Device& device, std::span<const Work> work);
   static vulkan::Command resolve(vulkan::Device& device, const Dispatch& dispatch);
   static vulkan::Command resolve(vulkan::Device& device, const Draw& draw);
+  GpuImage makeImage(const ImageDescription& description,
+                     std::span<const std::byte> texels = {}) const;
   static VkBuffer handleOf(const GpuBuffer& buffer) { return buffer.impl->buffer.buffer.get(); }
 
  private:

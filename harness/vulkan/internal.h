@@ -224,9 +224,11 @@ class Device {
   void download(const Buffer& from, std::size_t offset, std::span<std::byte> data);
   void fill(const Buffer& buffer, std::uint32_t pattern);
 
-  Image makeImage(const ImageDescription& description);
+  /// Of undefined content where there are no texels.
+  Image makeImage(const ImageDescription& description, std::span<const std::byte> texels);
   void upload(const Image& to, unsigned layer, unsigned mip, std::span<const std::byte> rows);
   void download(const Image& from, unsigned layer, unsigned mip, std::span<std::byte> rows);
+  void download(const Image& from, std::span<std::byte> texels);
   void fill(const Image& image, const std::array<std::byte, 16>& pixel);
   VkImageView viewOf(Image& image, const Image::View& wanted);
   OwnedSampler makeSampler(const SamplerDescription& description);
@@ -242,6 +244,12 @@ class Device {
   /// Where the host may read and write the buffer at once; null: nowhere. While submissions are in
   /// flight only a copy, which the queue puts behind them, touches no buffer of theirs.
   std::byte* inPlace(const Buffer& buffer) const;
+  /// Strips of an image from or to texels that lie one strip behind the other; `fresh` is an image
+  /// that has no layout yet.
+  void upload(const Image& to, std::span<const VkBufferImageCopy> strips,
+              std::span<const std::byte> texels, bool fresh = false);
+  void download(const Image& from, std::span<const VkBufferImageCopy> strips,
+                std::span<std::byte> texels);
 
   bool staged = false;
   VkPhysicalDeviceMemoryProperties memory{};

@@ -174,7 +174,7 @@ TEST_F(Sweep, AWorkerRefusesWhatIsNoTask) {
 TEST_F(Sweep, AWorkerRefusesACaseThatDoesNotExist) {
   const Said said = gnomonSays(
       R"(worker '{"root": "/", "device": "", "seed": 1, "generated": null, "timeout": null, "errors": null, )"
-      R"("kernels": {}, "shrinks": false, "failures": "", "replay": "", "validation": true, "probes": false, "cases": ["No.SuchCase"], "mutated": "", "mutants": [], "models": false, "kills": 1}')");
+      R"("kernels": {}, "shrinks": false, "failures": "", "replay": "", "validation": true, "probes": false, "watch": 0, "firstFailureOnly": false, "cases": ["No.SuchCase"], "mutated": "", "mutants": [], "models": false, "kills": 1}')");
   EXPECT_EQ(said.status, 2) << said.output;
   EXPECT_TRUE(mentions(said, "cases that do not exist"));
 }

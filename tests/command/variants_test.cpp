@@ -131,8 +131,8 @@ TEST_P(WrongVariant, IsCalledWrong) {
   // Shrinking has tests of its own; where a probe must be named, the user meets it with shrinking.
   const char* shrink = v.probe.empty() ? "--no-shrink " : "";
   const Said said =
-      gnomonSays(fmt::format("validate {0} {1}--cases {3} --kernel {0}={2}", v.kernel, shrink,
-                             fileOf(v, scratch).string(), inputsFor(v, 4096)));
+      gnomonSays(fmt::format("validate {0} --fail-fast {1}--cases {3} --kernel {0}={2}", v.kernel,
+                             shrink, fileOf(v, scratch).string(), inputsFor(v, 4096)));
   EXPECT_EQ(said.status, 1) << said.output;
   if (v.probe.empty()) return;
   EXPECT_TRUE(saysThatItDivergesAt(v.probe, said.output)) << v.probe << "\n" << said.output;

@@ -85,29 +85,54 @@ TEST(ResultsFileNowhere, IsAUsageError) {
   EXPECT_THROW(Results("/no/such/folder/results.jsonl", "one"), UsageError);
 }
 
-std::vector<CaseName> casesOf(const std::string& kernel, int n) {
-  std::vector<CaseName> all;
-  for (int i = 0; i < n; ++i) all.push_back({fmt::format("{}.{}", kernel, i), kernel});
+std::vector<Turn> turnsOf(const std::string& kernel, int n, unsigned width = 0) {
+  std::vector<Turn> all;
+  for (int i = 0; i < n; ++i) all.push_back({{fmt::format("{}.{}", kernel, i), kernel}, width});
   return all;
 }
 
-TEST(Batches, HoldOneStageAndSoManyCasesInOrder) {
-  std::vector<CaseName> cases = casesOf("a/x", 3);
-  for (const CaseName& c : casesOf("a/y", 2)) cases.push_back(c);
-  for (const CaseName& c : casesOf("b/z", 1)) cases.push_back(c);
-  const std::vector<Batch> batches = batchesOf(cases, {}, 4);
-  ASSERT_EQ(batches.size(), 3u);
-  EXPECT_EQ(batches[0].cases.size(), 4u);
-  EXPECT_EQ(batches[0].cases.back().name, "a/y.0");
-  EXPECT_EQ(batches[1].cases.size(), 1u);
-  EXPECT_EQ(batches[2].cases.front().name, "b/z.0");
-  EXPECT_TRUE(batchesOf({}, {}, 4).empty());
+std::vector<std::size_t> sizesOf(const std::vector<Batch>& batches) {
+  std::vector<std::size_t> sizes;
+  for (const Batch& b : batches) sizes.push_back(b.cases.size());
+  return sizes;
+}
+
+TEST(Batches, HoldOneStageInOrder) {
+  std::vector<Turn> turns = turnsOf("a/x", 3);
+  for (const Turn& t : turnsOf("a/y", 2)) turns.push_back(t);
+  for (const Turn& t : turnsOf("b/z", 1)) turns.push_back(t);
+  const std::vector<Batch> batches = batchesOf(turns, {}, 1, 5);
+  ASSERT_EQ(sizesOf(batches), (std::vector<std::size_t>{5, 1}));
+  EXPECT_EQ(batches[0].cases.back().name, "a/y.1");
+  EXPECT_EQ(batches[1].cases.front().name, "b/z.0");
+  EXPECT_TRUE(batchesOf({}, {}, 1, 4).empty());
+}
+
+TEST(Batches, BecomeSmallerTowardsTheEnd) {
+  EXPECT_EQ(sizesOf(batchesOf(turnsOf("a/x", 40), {}, 2, 2)),
+            (std::vector<std::size_t>{10, 7, 5, 4, 3, 2, 2, 2, 2, 3}));
+}
+
+TEST(Batches, CutFewKernelsInTwo) {
+  std::vector<Turn> turns = turnsOf("a/x", 5);
+  for (const Turn& t : turnsOf("a/y", 2)) turns.push_back(t);
+  for (const Turn& t : turnsOf("a/z", 9)) turns.push_back(t);
+  EXPECT_EQ(sizesOf(batchesOf(turns, {}, 2, 3)), (std::vector<std::size_t>{5, 2, 3, 6}));
+}
+
+TEST(Batches, HoldOneWidth) {
+  std::vector<Turn> turns = turnsOf("a/x", 2);
+  for (const Turn& t : turnsOf("a/x", 1, 128)) turns.push_back(t);
+  const std::vector<Batch> batches = batchesOf(turns, {}, 1, 4);
+  ASSERT_EQ(sizesOf(batches), (std::vector<std::size_t>{2, 1}));
+  EXPECT_EQ(batches[0].width, 0u);
+  EXPECT_EQ(batches[1].width, 128u);
 }
 
 TEST(Batches, KeepForeignKernelsApart) {
-  std::vector<CaseName> cases = casesOf("a/x", 1);
-  for (const CaseName& c : casesOf("a/y", 1)) cases.push_back(c);
-  EXPECT_EQ(batchesOf(cases, {.kernels = {{"a/y", "y.comp"}}}, 4).size(), 2u);
+  std::vector<Turn> turns = turnsOf("a/x", 1);
+  for (const Turn& t : turnsOf("a/y", 1)) turns.push_back(t);
+  EXPECT_EQ(batchesOf(turns, {.kernels = {{"a/y", "y.comp"}}}, 1, 4).size(), 2u);
 }
 
 TEST(Messages, ARecordSurvivesTheJourney) {
@@ -119,7 +144,6 @@ TEST(Messages, ARecordSurvivesTheJourney) {
   EXPECT_EQ(there.name, "A.A");
   EXPECT_TRUE(there.failed);
   EXPECT_TRUE(there.threadsCommunicate);
-  EXPECT_FALSE(there.usesSubgroups);
   const MeasuredError& log = there.measured.at(Operation::log);
   EXPECT_EQ(log.worst.ulp, 3.344);
   EXPECT_EQ(log.worst.absolute, INFINITY);
