@@ -103,6 +103,23 @@ TEST(Isolation, ACaseThatKillsItsWorkerFailsAlone) {
                    "worker exited with status 7");
 }
 
+TEST(Isolation, ARunThatFailsFastEndsWithTheCaseThatFails) {
+  const Judged judged = validatesWithFault(fmt::format("exit:{}", kCase), "--fail-fast --jobs 1");
+  EXPECT_EQ(judged.said.status, 1);
+  EXPECT_TRUE(has(judged.said.output, "worker exited with status 7")) << judged.said.output;
+  EXPECT_TRUE(has(judged.said.output, "stopped at the first failure: ")) << judged.said.output;
+  EXPECT_TRUE(has(judged.said.output, " of 28 cases have not run")) << judged.said.output;
+  const auto stage = judged.json["stages"][0];
+  EXPECT_EQ(stage["failed"], 1);
+  EXPECT_LT(stage["cases"], 28);
+}
+
+TEST(Isolation, ARunThatFailsFastAndDoesNotFailIsLikeAnyOther) {
+  const Judged judged = validates("brdf --cases 64 --fail-fast");
+  EXPECT_EQ(judged.said.status, 0) << judged.said.output;
+  EXPECT_EQ(judged.json["stages"][0]["cases"], 28);
+}
+
 TEST(Isolation, ACaseThatHangsFailsAlone) {
   expectOneFailure(validatesWithFault(fmt::format("hang:{}", kCase), "--timeout 1"),
                    "did not end within 1 s");

@@ -128,13 +128,6 @@ TEST_F(CullingFrustumSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
 }
 
-TEST_F(CullingFrustum, MoreBlocksThanThreadsAreListed) { moreBlocksThanThreadsAreListed(); }
-TEST_F(CullingFrustumSubgroups, MoreBlocksThanThreadsAreListed) {
-  moreBlocksThanThreadsAreListed();
-}
-
-TEST_F(CullingFrustum, GroupsWithoutABlockDoNothing) { groupsWithoutABlockDoNothing(); }
-
 TEST_F(CullingFrustum, GroupsThatAskAreAnswered) {
   widthDoesNotMatter();
   groupsThatAskAreAnswered();
@@ -143,6 +136,13 @@ TEST_F(CullingFrustumSubgroups, GroupsThatAskAreAnswered) {
   widthDoesNotMatter();
   groupsThatAskAreAnswered();
 }
+
+TEST_F(CullingFrustum, MoreBlocksThanThreadsAreListed) { moreBlocksThanThreadsAreListed(); }
+TEST_F(CullingFrustumSubgroups, MoreBlocksThanThreadsAreListed) {
+  moreBlocksThanThreadsAreListed();
+}
+
+TEST_F(CullingFrustum, GroupsWithoutABlockDoNothing) { groupsWithoutABlockDoNothing(); }
 
 TEST_F(CullingFrustum, ManySpheresAreListedAsTheModelSays) { manySpheresAreListedAsTheModelSays(); }
 TEST_F(CullingFrustumSubgroups, ManySpheresAreListedAsTheModelSays) {

@@ -137,6 +137,15 @@ TEST_F(CullingOcclusionSubgroups, BlocksAreCountedByWhoeverAsksNobody) {
   blocksAreCountedByWhoeverAsksNobody();
 }
 
+TEST_F(CullingOcclusion, GroupsThatAskAreAnswered) {
+  widthDoesNotMatter();
+  expectAnswers(anyInput(3 * kBlock, {61, 43}, caseSeed()));
+}
+TEST_F(CullingOcclusionSubgroups, GroupsThatAskAreAnswered) {
+  widthDoesNotMatter();
+  expectAnswers(anyInput(3 * kBlock, {61, 43}, caseSeed()));
+}
+
 // Whether they are answered, the frustum's case tells: it asks with the same code.
 TEST_F(CullingOcclusion, MoreBlocksThanThreadsAreListed) {
   widthDoesNotMatter();
@@ -147,15 +156,6 @@ TEST_F(CullingOcclusionSubgroups, MoreBlocksThanThreadsAreListed) {
   const OcclusionInput input = moreBlocksThanThreads();
   expectEveryThird(visible(input));
   expectAnswers(input);
-}
-
-TEST_F(CullingOcclusion, GroupsThatAskAreAnswered) {
-  widthDoesNotMatter();
-  expectAnswers(anyInput(3 * kBlock, {61, 43}, caseSeed()));
-}
-TEST_F(CullingOcclusionSubgroups, GroupsThatAskAreAnswered) {
-  widthDoesNotMatter();
-  expectAnswers(anyInput(3 * kBlock, {61, 43}, caseSeed()));
 }
 
 TEST_F(CullingOcclusion, SpheresAreListedAsTheModelSaysAtEverySizeOfTheScreen) {

@@ -124,12 +124,15 @@ std::vector<Range> rangesOf(const std::vector<Pixel>& pixels) {
   return ranges;
 }
 
-Observation observeMinMax(Gpu& gpu, const KernelRecord& record, const std::string& firstBarrier) {
+Observation observeMinMax(Gpu& gpu, const KernelRecord& record, const std::string& firstBarrier,
+                          Watch watch = Watch::kAll) {
   const Subject subject(gpu, record, {.words = minMax(firstBarrier), .origin = "minmax.comp"});
   const std::vector<Pixel> pixels = noise();
-  return observe(subject, {.inputs = {{"pixels", std::as_bytes(std::span(pixels))}},
-                           .outputs = {{"ranges", pixels.size()}},
-                           .extent = {kWidth, kWidth}});
+  return observe(subject,
+                 {.inputs = {{"pixels", std::as_bytes(std::span(pixels))}},
+                  .outputs = {{"ranges", pixels.size()}},
+                  .extent = {kWidth, kWidth}},
+                 watch);
 }
 
 TEST_F(Communication, ARightKernelWithSharedMemoryIsClean) {
@@ -148,6 +151,20 @@ TEST_F(Communication, AMissingBarrierThatTheOrderOfSubgroupsHidesIsFound) {
   EXPECT_TRUE(finds(seen, kOrderFinding)) << all(seen);
   EXPECT_TRUE(finds(seen, "of 32768 words of 'ranges' differ, first ranges[")) << all(seen);
   EXPECT_TRUE(finds(seen, "a barrier is missing")) << all(seen);
+}
+
+TEST_F(Communication, TheTwinsAloneFindItToo) {
+  if (!startsWithFirst()) GTEST_SKIP() << "no promise about the order on this device";
+  const Observation seen = observeMinMax(*gpu, minMaxRecord(), "", Watch::kTwins);
+  EXPECT_TRUE(finds(seen, kOrderFinding)) << all(seen);
+  EXPECT_EQ(seen.plain, seen.twin);
+}
+
+TEST_F(Communication, NothingIsTurnedRoundWhereItIsNotWatched) {
+  for (const Watch watch : {Watch::kInOrder, Watch::kTwinAlone}) {
+    const Observation seen = observeMinMax(*gpu, minMaxRecord(), "", watch);
+    EXPECT_TRUE(seen.findings.empty()) << all(seen);
+  }
 }
 
 TEST_F(Communication, AContractThatIsNotDeterministicMayDependOnTheOrder) {

@@ -156,6 +156,38 @@ TEST_F(GpuImageTest, EveryLayerAndMipOfEveryFormatComesBackAsItWasSent) {
   }
 }
 
+/// Layer by layer, each with its mip levels.
+Bytes allContent(const ImageDescription& image) {
+  Bytes all;
+  for (unsigned layer = 0; layer < image.layers; ++layer)
+    for (unsigned mip = 0; mip < image.mips; ++mip) {
+      const Bytes level = content(image, layer, mip);
+      all.insert(all.end(), level.begin(), level.end());
+    }
+  return all;
+}
+
+// The odd one in one submission, which leaves a byte over in some formats; the large one in some.
+TEST_F(GpuImageTest, AWholeImageIsMadeOfItsTexelsAndGivesThemBack) {
+  const auto expectItself = [](const ImageDescription& description) {
+    const Bytes sent = allContent(description);
+    const GpuImage image = gpu->allocateImage(description, sent);
+    for (unsigned layer = 0; layer < description.layers; ++layer)
+      for (unsigned mip = 0; mip < description.mips; ++mip)
+        EXPECT_EQ(downloaded<std::byte>(*gpu, image, layer, mip), content(description, layer, mip))
+            << textOf(description, layer, mip);
+    Bytes back(imageBytes(description));
+    gpu->downloadImage(image, back);
+    EXPECT_TRUE(back == sent) << nameOf(description.format);
+  };
+  for (const PixelFormat format : kFormats) {
+    ImageDescription description = kOdd;
+    description.format = format;
+    expectItself(description);
+  }
+  expectItself({.width = 2049, .height = 2100, .layers = 2, .mips = 3});
+}
+
 TEST_F(GpuImageTest, AnImageLargerThanTheStagingBufferComesBackWhole) {
   const GpuImage image = gpu->allocateImage({.width = 2049, .height = 2100});
   const Bytes sent = content(image.description(), 0, 0);
@@ -453,6 +485,8 @@ TEST_F(GpuImageTest, WhatNoDeviceCanDoIsAProgrammingError) {
 
   const GpuImage image = gpu->allocateImage({.width = 2, .layers = 2, .mips = 2});
   Bytes eight(8);
+  EXPECT_THROW(gpu->allocateImage(image.description(), eight), std::logic_error);
+  EXPECT_THROW(gpu->downloadImage(image, eight), std::logic_error);
   EXPECT_THROW(gpu->uploadImage(image, 2, 0, eight), std::out_of_range);
   EXPECT_THROW(gpu->downloadImage(image, 0, 2, eight), std::out_of_range);
   EXPECT_THROW(gpu->uploadImage(image, 0, 1, eight), std::logic_error);
