@@ -17,7 +17,11 @@ const uint kPerThread = kBlock / kGroupSize;
 shared uint visible[kWords];  // a bit a candidate
 shared uint blockOfGroup;
 shared uint visibleUpTo[kWords + 1];  // candidates before the first of each word, and all
-shared uint visibleBefore;            // the block
+#ifdef GNOMON_SUBGROUPS
+shared uint heard[kGroupSize];  // by each thread: candidates before the block
+#else
+shared uint visibleBefore;  // the block
+#endif
 shared bool isLastGroup;
 
 bool isVisible(uint candidate);
@@ -43,7 +47,12 @@ uint countOf(uint block, inout uint patience) {
 
 void takeBlock(uint lane) {
   if (lane < kWords) visible[lane] = 0;
-  if (isFirstThread()) blockOfGroup = atomicAdd(scratch[kTicket], 1u);
+  if (isFirstThread()) {
+    blockOfGroup = atomicAdd(scratch[kTicket], 1u);
+#ifndef GNOMON_SUBGROUPS
+    visibleBefore = 0;
+#endif
+  }
   barrier();
 }
 
@@ -62,33 +71,43 @@ void publish(uint lane) {
     uint before = 0;
     for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
     visibleUpTo[lane] = before;
-    if (lane == kWords) {
-      visibleBefore = 0;
+    if (lane == kWords)
       atomicStore(scratch[kBlocks + blockOfGroup], before + 1, gl_ScopeDevice, 0, 0);
-    }
   }
   barrier();
 }
 
-void askOthers(uint lane, uint patience) {
-  uint before = 0;
-  for (uint b = lane; b < blockOfGroup; b += kGroupSize) before += countOf(b, patience);
-#ifdef GNOMON_SUBGROUPS
-  before = subgroupAdd(before);
-  if (subgroupElect()) atomicAdd(visibleBefore, before);
-#else
-  atomicAdd(visibleBefore, before);
-#endif
-  // What the group has used of the scratch is used before the thread that counts the group goes on.
+/// Behind it, what the group has used of the scratch is used before the thread that counts the
+/// group goes on.
+void askedAll() {
   controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup,
                  gl_StorageSemanticsBuffer | gl_StorageSemanticsShared, gl_SemanticsAcquireRelease);
 }
 
-void listBlock(uint lane, uint capacity) {
+/// Visible candidates before the group's block; every thread gets them.
+uint askOthers(uint lane, uint patience) {
+  uint before = 0;
+  for (uint b = lane; b < blockOfGroup; b += kGroupSize) before += countOf(b, patience);
+#ifdef GNOMON_SUBGROUPS
+  // Every subgroup adds up what all threads have heard: as many lanes as it has, full or not.
+  heard[lane] = before;
+  askedAll();
+  before = 0;
+  const uint lanes = subgroupAdd(1u);
+  for (uint i = subgroupExclusiveAdd(1u); i < kGroupSize; i += lanes) before += heard[i];
+  return subgroupAdd(before);
+#else
+  atomicAdd(visibleBefore, before);
+  askedAll();
+  return visibleBefore;
+#endif
+}
+
+void listBlock(uint lane, uint before, uint capacity) {
   for (uint k = 0; k < kPerThread; ++k) {
     const uint i = k * kGroupSize + lane, word = visible[i / 32], bit = 1u << i % 32;
     if ((word & bit) == 0) continue;
-    const uint position = visibleBefore + visibleUpTo[i / 32] + bitCount(word & bit - 1);
+    const uint position = before + visibleUpTo[i / 32] + bitCount(word & bit - 1);
     if (position < capacity) list(blockOfGroup * kBlock + i, position);
   }
 }
@@ -107,9 +126,9 @@ uint visibleSoFar(uint lane, uint candidates, uint capacity, uint patience) {
   if (blockOfGroup >= blocksOf(candidates)) return 0;  // the host may not know how many there are
   markVisible(lane, candidates);
   publish(lane);
-  askOthers(lane, patience);
-  listBlock(lane, capacity);
-  return visibleBefore + visibleUpTo[kWords];
+  const uint before = askOthers(lane, patience);
+  listBlock(lane, before, capacity);
+  return before + visibleUpTo[kWords];
 }
 
 /// The last group of all sums up and leaves the scratch as it was: zero. What is visible up to a

@@ -102,10 +102,9 @@ KernelRecord occlusion(std::string entry) {
   return record;
 }
 
-/// The other path to the same contract. Of its own it has how counts are summed, in both alike, and
-/// where that puts a draw.
+/// The other path to the same contract. Of its own it has how counts are summed, in both alike.
 KernelRecord withSubgroups(KernelRecord record) {
-  record.ownCode = {"culling/compact.glsl:askOthers", "culling/compact.glsl:listBlock"};
+  record.ownCode = {"culling/compact.glsl:askOthers"};
   record.features.emplace_back("subgroupArithmetic");
   record.summary = "the same with subgroup operations";
   return record;
