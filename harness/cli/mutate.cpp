@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 /// A mutant that no case tells from the kernel.
 struct Survivor {
   const Mutant* mutant = nullptr;            ///< of the outcome's answer
-  std::optional<std::string> explanation{};  ///< the reason on record
+  std::optional<Explanation> explanation{};  ///< on record
 };
 
 /// What a run says of one kernel, against what is on record.
@@ -42,33 +42,30 @@ fs::path recordFile(const fs::path& root, const std::string& kernel) {
   return root / "tests/mutants" / (stageOf(kernel) + ".json");
 }
 
-Score scoreOf(const Answer& answer) {
-  return {.mutants = answer.mutants.size() + answer.equivalent.size(),
-          .equivalent = answer.equivalent.size(),
-          .killed = answer.killed()};
-}
-
 std::string scoreText(const Score& s) {
   return fmt::format("{:.3f} ({} of {})", s.value(), s.killed, s.mutants - s.equivalent);
 }
 
 /// An explanation holds for the line and the change that it was written for.
-std::optional<std::string> explanationOf(const MutantRecord& record, const Mutant& m) {
+std::optional<Explanation> explanationOf(const MutantRecord& record, const Mutant& m) {
   const Explanation* e = record.find(m.id);
   if (e == nullptr || e->text != m.place.text || e->change != m.change) return std::nullopt;
-  return e->reason;
+  return *e;
 }
 
 Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& policy, bool whole) {
   Outcome outcome{.answer = std::move(answer)};
   const Answer& a = outcome.answer;
-  outcome.score = scoreOf(a);
   std::size_t unexplained = 0;
   for (std::size_t i = 0; i < a.mutants.size(); ++i) {
-    if (!a.fates[i].survived()) continue;
-    outcome.survivors.push_back({&a.mutants[i], explanationOf(record, a.mutants[i])});
-    unexplained += !outcome.survivors.back().explanation;
+    const auto explanation = explanationOf(record, a.mutants[i]);
+    if (!a.fates[i].survived() && !(explanation && explanation->race)) continue;
+    outcome.survivors.push_back({&a.mutants[i], explanation});
+    unexplained += !explanation;
   }
+  outcome.score = {.mutants = a.mutants.size() + a.equivalent.size(),
+                   .equivalent = a.equivalent.size(),
+                   .killed = a.mutants.size() - outcome.survivors.size()};
   if (unexplained > 0)
     outcome.problems.push_back(fmt::format(
         "{}: {} of its mutants survive and nobody has explained why", a.kernel, unexplained));
@@ -80,7 +77,7 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
                                            policy["mutationScore"]));
   for (const Explanation& e : record.survivors) {
     const bool needed = std::ranges::any_of(outcome.survivors, [&](const Survivor& s) {
-      return s.mutant->id == e.id && s.explanation;
+      return s.explanation && s.mutant->id == e.id;
     });
     if (!needed)
       outcome.problems.push_back(fmt::format(
@@ -92,7 +89,7 @@ Outcome outcomeOf(Answer answer, const MutantRecord& record, const Policy& polic
 
 std::string describe(const Survivor& s) {
   const Mutant& m = *s.mutant;
-  const std::string why = s.explanation ? "explained: " + *s.explanation : "NOT EXPLAINED";
+  const std::string why = s.explanation ? "explained: " + s.explanation->reason : "NOT EXPLAINED";
   if (m.place.file.empty()) return fmt::format("  {}\n    {}\n", m.id, why);
   return fmt::format("  kernels/{}:{}  {}\n    {}\n    {}\n    {}\n", m.place.file, m.place.line,
                      m.id, m.place.text, m.change, why);
@@ -136,7 +133,7 @@ std::string outcomesJson(const std::vector<Outcome>& outcomes, const MutateOptio
     for (const Survivor& s : o.survivors) {
       survived.push_back(jsonOf(*s.mutant));
       survived.back()["reason"] =
-          s.explanation ? nlohmann::json(*s.explanation) : nlohmann::json(nullptr);
+          s.explanation ? nlohmann::json(s.explanation->reason) : nlohmann::json(nullptr);
     }
     for (std::size_t i = 0; i < o.answer.mutants.size(); ++i) {
       const Fate& fate = o.answer.fates[i];

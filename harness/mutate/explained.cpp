@@ -45,7 +45,8 @@ MutantRecord recordFrom(const Json& json, const std::string& where) {
     record.survivors.push_back({.id = id,
                                 .text = textAt(s, "text", at),
                                 .change = textAt(s, "change", at),
-                                .reason = textAt(s, "reason", at)});
+                                .reason = textAt(s, "reason", at),
+                                .race = s.contains("race") && s["race"] == true});
   }
   return record;
 }
@@ -101,9 +102,11 @@ void saveMutantRecords(const std::filesystem::path& file, const MutantRecords& r
                         {"equivalent", record.score->equivalent},
                         {"killed", record.score->killed}};
     entry["survivors"] = Json::array();
-    for (const Explanation& e : record.survivors)
-      entry["survivors"].push_back(
-          {{"id", e.id}, {"change", e.change}, {"text", e.text}, {"reason", e.reason}});
+    for (const Explanation& e : record.survivors) {
+      Json survivor = {{"id", e.id}, {"change", e.change}, {"text", e.text}, {"reason", e.reason}};
+      if (e.race) survivor["race"] = true;
+      entry["survivors"].push_back(std::move(survivor));
+    }
   }
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);

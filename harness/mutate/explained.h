@@ -16,6 +16,9 @@ struct Explanation {
   std::string text{};    ///< the source line that it was written for
   std::string change{};  ///< as Mutant::change
   std::string reason{};  ///< that a reviewer can check
+  /// Whether it survives is chance: two threads would have to meet. It then counts as a survivor
+  /// also in a run in which they did, so that the score is one number.
+  bool race = false;
 };
 
 /// The outcome of a full run.
@@ -40,8 +43,8 @@ struct MutantRecord {
 using MutantRecords = std::map<std::string, MutantRecord>;
 
 /// Reads {"brdf/evaluate": {"score": {"mutants", "equivalent", "killed"}, "survivors": [{"id",
-/// "change", "text", "reason"}]}}; empty if there is no file. Throws UsageError naming file and
-/// entry where one lacks something or gives no reason.
+/// "change", "text", "reason", "race" where true}]}}; empty if there is no file. Throws UsageError
+/// naming file and entry where one lacks something or gives no reason.
 MutantRecords loadMutantRecords(const std::filesystem::path& file);
 
 /// Throws UsageError where it cannot be written.

@@ -175,11 +175,6 @@ class Inquiry {
 
 }  // namespace
 
-std::size_t Answer::killed() const {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(fates, [](const Fate& f) { return !f.survived(); }));
-}
-
 std::vector<std::string> mutatedKernels(const std::vector<std::string>& stages) {
   std::set<std::string> chosen;
   for (const CaseName& c : selectCases({.stages = stages})) chosen.insert(c.kernel);

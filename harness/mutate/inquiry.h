@@ -34,8 +34,6 @@ struct Answer {
   std::size_t invalid = 0, duplicates = 0;
   std::size_t remembered = 0;  ///< fates that an earlier run has found
   double seconds = 0;
-
-  std::size_t killed() const;
 };
 
 /// Told as it goes on: fates known and mutants in all, killed of them, and what is judged now.

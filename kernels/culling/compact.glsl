@@ -47,12 +47,7 @@ uint countOf(uint block, inout uint patience) {
 
 void takeBlock(uint lane) {
   if (lane < kWords) visible[lane] = 0;
-  if (isFirstThread()) {
-    blockOfGroup = atomicAdd(scratch[kTicket], 1u);
-#ifndef GNOMON_SUBGROUPS
-    visibleBefore = 0;
-#endif
-  }
+  if (isFirstThread()) blockOfGroup = atomicAdd(scratch[kTicket], 1u);
   barrier();
 }
 
@@ -71,8 +66,12 @@ void publish(uint lane) {
     uint before = 0;
     for (uint w = 0; w < lane; ++w) before += bitCount(visible[w]);
     visibleUpTo[lane] = before;
-    if (lane == kWords)
+    if (lane == kWords) {
+#ifndef GNOMON_SUBGROUPS
+      visibleBefore = 0;
+#endif
       atomicStore(scratch[kBlocks + blockOfGroup], before + 1, gl_ScopeDevice, 0, 0);
+    }
   }
   barrier();
 }

@@ -247,12 +247,15 @@ TEST(MutantRecords, ComeBackAsTheyWere) {
   const MutantRecords records = {
       {"brdf/evaluate",
        {.score = Score{.mutants = 10, .equivalent = 2, .killed = 7},
-        .survivors = {{"f:g:constant:1", "a < b", "2 becomes 3", "b is never 2"}}}}};
+        .survivors = {{"f:g:constant:1", "a < b", "2 becomes 3", "b is never 2"},
+                      {"f:g:atomic:1", "a + b", "torn", "two threads would have to meet", true}}}}};
   saveMutantRecords(file, records);
   const MutantRecords again = loadMutantRecords(file);
   EXPECT_EQ(again.at("brdf/evaluate").score, records.at("brdf/evaluate").score);
   ASSERT_NE(again.at("brdf/evaluate").find("f:g:constant:1"), nullptr);
   EXPECT_EQ(again.at("brdf/evaluate").find("f:g:constant:1")->reason, "b is never 2");
+  EXPECT_FALSE(again.at("brdf/evaluate").find("f:g:constant:1")->race);
+  EXPECT_TRUE(again.at("brdf/evaluate").find("f:g:atomic:1")->race);
   EXPECT_DOUBLE_EQ(again.at("brdf/evaluate").score->value(), 7.0 / 8);
 }
 
