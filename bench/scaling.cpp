@@ -64,11 +64,18 @@ std::string lawText(const Curve& curve) {
 }
 
 /// A counter's text, or nothing where the benchmark has none.
-std::string counterText(const Outcome& outcome, const char* name, const char* format,
-                        double unit = 1) {
+std::string counterText(const Outcome& outcome, const char* name, const char* format, double unit) {
   const auto found = outcome.counters.find(name);
   return found == outcome.counters.end() ? ""
                                          : fmt::format(fmt::runtime(format), found->second * unit);
+}
+
+/// Gigabytes a second: three digits, or all before the point.
+std::string rateText(const Outcome& outcome) {
+  const auto found = outcome.counters.find("bytes_per_second");
+  if (found == outcome.counters.end()) return "";
+  const double rate = found->second * 1e-9;
+  return rate < 999.5 ? fmt::format("{:.3g}", rate) : fmt::format("{:.0f}", rate);
 }
 
 std::vector<std::string> rowOf(const Curve& curve) {
@@ -84,7 +91,7 @@ std::vector<std::string> rowOf(const Curve& curve) {
           draws("draws_before"),
           draws("draws_after"),
           counterText(*outcome, "culled", "{:.1f} %", 100),
-          counterText(*outcome, "bytes_per_second", "{:.3g}", 1e-9),
+          rateText(*outcome),
           counterText(*outcome, "share_of_copy", "{:.1f} %", 100),
           lawText(curve)};
 }
