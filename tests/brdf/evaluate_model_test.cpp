@@ -270,7 +270,8 @@ std::array<double, kScalars.size()> scalarsOf(ShadedOf<double> shaded) {
 }
 
 // A unit half vector rounds n x h by 2^-52 of 1; inside the lobe |n x h| is about alpha, and D goes
-// with its inverse fourth power. All else are a few roundings of numbers of about 1.
+// with its inverse fourth power: four times 2^-52 / alpha, once in what is judged and once in its
+// parts, so eight. All else are a few roundings of numbers of about 1.
 const double kUnitHalf =
     8 * std::numeric_limits<double>::epsilon() / (double{kMinRoughness} * kMinRoughness);
 
